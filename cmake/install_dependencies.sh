@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Sees to it that everything is there that decant's own programs are built from: installs the missing apt packages
+# where it may, else says which they are and ends with status 1. Arguments: further apt packages to look for.
+# DECANT_DEPENDENCIES=skip in the environment leaves all this out, for machines that have things by other means.
+set -euo pipefail
+
+if [[ ${DECANT_DEPENDENCIES:-} == skip ]]; then
+  exit 0
+fi
+if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
+  echo "This is no Debian or Ubuntu: decant needs g++ 11 or newer (or clang++), CMake 3.22, Ninja, Eigen 3.4," \
+    "nlohmann_json, libpng and CLI11; nanoflann if it is there; Catch2 for the tests. Going on with what there is." >&2
+  exit 0
+fi
+
+missing=()
+need() { missing+=("$1"); }
+# tools may come from elsewhere than a package
+command -v "${CXX:-c++}" >/dev/null || need g++
+command -v cmake >/dev/null || need cmake
+command -v ninja >/dev/null || need ninja-build
+for package in libeigen3-dev libnanoflann-dev nlohmann-json3-dev libpng-dev libcli11-dev "$@"; do
+  state=$(dpkg-query --show --showformat '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $state == installed ]] || need "$package"
+done
+if ((${#missing[@]} == 0)); then
+  exit 0
+fi
+
+as_root=()
+if ((EUID != 0)); then
+  as_root=(sudo)
+  # without a terminal nobody can type a password
+  if ! command -v sudo >/dev/null || { [[ ! -t 0 || -n ${CI:-} ]] && ! sudo -n true 2>/dev/null; }; then
+    echo "These packages are missing, and installing them takes an administrator:" >&2
+    echo "  sudo apt-get install ${missing[*]}" >&2
+    exit 1
+  fi
+fi
+echo "Installing ${missing[*]}"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+install=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}")
+# the list of packages may be out of date or empty
+if ! { "${as_root[@]}" apt-get update && "${install[@]}"; } >"$log" 2>&1; then
+  tail -n 15 "$log" >&2
+  echo "Installing failed. Missing: ${missing[*]}" >&2
+  exit 1
+fi

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Wall integrals of a triangle mesh: computed once on a grid in the body's frame, then looked up.
+
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/wall_function.hpp>
+#include <decant/boundary/wall_sample.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
+
+namespace decant {
+
+/// What lies in the shadow of a mesh: the integral of the wall's weight (WallFunction) over all points that the surface
+/// hides from the particle. Along a ray in direction u that meets the surface at distance t, the radial part is known in
+/// closed form, so only directions are summed:
+///   share    = int du G(t),     G(t) = int_t^R w s^2 ds   = (share_plane(t) + t slope_plane(t)) / 2 pi
+///   gradient = int du u K(t),   K(t) = -int_t^R w' s^2 ds = t^2 w(t) + slope_plane(t) / pi
+/// A surface hides what is behind it whatever its thickness and orientation, which makes thin walls and small defects
+/// harmless; corners and curved walls need no special case.
+/// Immutable after construction and shared between simulations; refers to the hierarchy, which it does not own.
+class MeshWall {
+ public:
+  /// Number of grid cells per particle spacing.
+  static constexpr double cells_per_spacing = 3;
+
+  /// @param spacing particle spacing [m], > 0.
+  template <class Kernel>
+  static MeshWall of(const BoundingVolumeHierarchy& surface, double smoothing_length, double spacing, Threads threads) {
+    expects(std::isfinite(spacing) && spacing > 0, "MeshWall: particle spacing [m]", "> 0", spacing);
+    MeshWall wall;
+    wall.surface_ = &surface;
+    wall.plane_ = WallFunction::of<Kernel>(smoothing_length, spacing);
+    wall.cell_ = spacing / cells_per_spacing;
+    wall.build(threads);
+    return wall;
+  }
+
+  /// Distance from which the wall is not felt [m].
+  double reach() const noexcept { return plane_.reach(); }
+
+  /// False where no wall is within the support of x (in the body's frame).
+  bool sample(const Vector3<double>& x, WallSample& result) const noexcept {
+    std::array<int, 3> cell;
+    Vector3<double> t;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double place = (x[axis] - origin_[axis]) / cell_;
+      if (!(place >= 0 && place < static_cast<double>(blocks_[static_cast<std::size_t>(axis)] * block_cells))) {
+        return false;
+      }
+      const auto at = static_cast<std::size_t>(axis);
+      cell[at] = static_cast<int>(place);
+      t[axis] = place - cell[at];
+    }
+    const std::int32_t block = block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
+    if (block < 0) {
+      return false;
+    }
+    const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
+    const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
+    if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
+      return sample_directly(x, result);  // the surface passes through this cell: its corners see different sides
+    }
+    Eigen::Matrix<double, 5, 1> mean = Eigen::Matrix<double, 5, 1>::Zero();
+    double correction = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
+      const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
+      const Eigen::Matrix<double, 5, 1> node = nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
+      mean += weight * node;
+      // half a step along each corner's gradient makes the mean exact for quadratic fields
+      correction += weight * node.segment<3>(1).dot(t - Vector3<double>(di, dj, dk));
+    }
+    result.share = std::max(mean[0] + 0.5 * cell_ * correction, 0.0);
+    result.gradient = mean.segment<3>(1);
+    result.distance = mean[4];
+    return result.share > 0;
+  }
+
+  /// The sum over directions at x itself: slower by a factor of about a hundred, exact at any place.
+  bool sample_directly(const Vector3<double>& x, WallSample& result) const noexcept {
+    const auto nearest = surface_->closest_point(x, reach());
+    if (!nearest) {
+      return false;
+    }
+    result.distance = nearest->distance;
+    result.share = 0;
+    result.gradient.setZero();
+    for (const Vector3<double>& direction : directions()) {
+      const auto hit = surface_->first_hit(x, x + reach() * direction);
+      if (!hit) {
+        continue;
+      }
+      const double t = hit->fraction * reach();
+      result.share += (plane_.share(t) + t * plane_.slope(t)) / (2 * pi);
+      result.gradient += direction * (t * plane_.radius_times_weight(t) + plane_.slope(t) / pi);
+    }
+    const double solid_angle = 4 * pi / static_cast<double>(direction_count);
+    result.share *= solid_angle;
+    result.gradient *= solid_angle;
+    return result.share > 0;
+  }
+
+ private:
+  static constexpr double pi = 3.14159265358979323846;
+  static constexpr std::size_t direction_count = 128;
+  static constexpr int block_cells = 8;
+  static constexpr int block_nodes = block_cells + 1;
+
+  /// Eight cells a side; border nodes are stored in both blocks, so that a look-up stays within one.
+  struct Block {
+    std::array<Eigen::Matrix<float, 5, 1>, block_nodes * block_nodes * block_nodes> value;
+    std::bitset<block_cells * block_cells * block_cells> crossed;
+  };
+
+  static std::size_t node_number(int i, int j, int k) noexcept {
+    return static_cast<std::size_t>((k * block_nodes + j) * block_nodes + i);
+  }
+
+  std::size_t block_number(int i, int j, int k) const noexcept {
+    return (static_cast<std::size_t>(k) * static_cast<std::size_t>(blocks_[1]) + static_cast<std::size_t>(j)) *
+               static_cast<std::size_t>(blocks_[0]) +
+           static_cast<std::size_t>(i);
+  }
+
+  /// Evenly spread over the sphere (Fibonacci lattice), the same everywhere so that the sum varies smoothly in space.
+  static const std::array<Vector3<double>, direction_count>& directions() noexcept {
+    static const std::array<Vector3<double>, direction_count> all = [] {
+      std::array<Vector3<double>, direction_count> made;
+      const double golden_angle = pi * (3 - std::sqrt(5.0));
+      for (std::size_t k = 0; k < direction_count; ++k) {
+        const double z = 1 - 2 * (static_cast<double>(k) + 0.5) / static_cast<double>(direction_count);
+        const double radius = std::sqrt(1 - z * z);
+        const double angle = golden_angle * static_cast<double>(k);
+        made[k] = {radius * std::cos(angle), radius * std::sin(angle), z};
+      }
+      return made;
+    }();
+    return all;
+  }
+
+  void build(Threads threads) {
+    const Eigen::AlignedBox3d bounds = surface_->bounds();
+    const double margin = reach() + cell_;
+    const double block_size = cell_ * block_cells;
+    origin_ = bounds.min().array() - margin;
+    double blocks = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double length = bounds.max()[axis] - bounds.min()[axis] + 2 * margin;
+      const double count = std::ceil(length / block_size);
+      blocks *= count;
+      // 1e8 blocks of 8 cells: 400 MB of table; beyond it the spacing does not fit the body
+      expects(blocks < 1e8, "MeshWall: size of the mesh over the particle spacing", "< 1e3 per axis or so",
+              length / spacing_of_cell());
+      blocks_[static_cast<std::size_t>(axis)] = static_cast<int>(count);
+    }
+    block_of_.assign(static_cast<std::size_t>(blocks), -1);
+    std::vector<std::array<int, 3>> used;
+    const double half_diagonal = 0.5 * std::sqrt(3.0) * block_size;
+    for (int k = 0; k < blocks_[2]; ++k) {
+      for (int j = 0; j < blocks_[1]; ++j) {
+        for (int i = 0; i < blocks_[0]; ++i) {
+          const Vector3<double> center = origin_ + block_size * Vector3<double>(i + 0.5, j + 0.5, k + 0.5);
+          if (surface_->closest_point(center, reach() + half_diagonal)) {
+            block_of_[block_number(i, j, k)] = static_cast<std::int32_t>(used.size());
+            used.push_back({i, j, k});
+          }
+        }
+      }
+    }
+    block_data_.resize(used.size());
+    for (auto& block : block_data_) {
+      block = std::make_unique<Block>();
+    }
+    parallel_ranges(static_cast<Index>(used.size()), threads, 1, [&](Index b, Index) {
+      const auto& place = used[static_cast<std::size_t>(b)];
+      fill(*block_data_[static_cast<std::size_t>(b)],
+           origin_ + block_size * Vector3<double>(place[0], place[1], place[2]));
+    });
+  }
+
+  double spacing_of_cell() const noexcept { return cell_ * cells_per_spacing; }
+
+  void fill(Block& block, const Vector3<double>& corner) const noexcept {
+    for (int k = 0; k < block_nodes; ++k) {
+      for (int j = 0; j < block_nodes; ++j) {
+        for (int i = 0; i < block_nodes; ++i) {
+          WallSample sample;
+          sample.distance = reach();
+          sample_directly(corner + cell_ * Vector3<double>(i, j, k), sample);
+          auto& node = block.value[node_number(i, j, k)];
+          node[0] = static_cast<float>(sample.share);
+          node.segment<3>(1) = sample.gradient.cast<float>();
+          node[4] = static_cast<float>(sample.distance);
+        }
+      }
+    }
+    const double half_diagonal = 0.5 * std::sqrt(3.0) * cell_;
+    for (int k = 0; k < block_cells; ++k) {
+      for (int j = 0; j < block_cells; ++j) {
+        for (int i = 0; i < block_cells; ++i) {
+          // two corners on opposite sides of a wall have a distance sum below their own distance: within one cell, a
+          // surface can only be where some corner is nearer than half the diagonal
+          float nearest = std::numeric_limits<float>::max();
+          for (int corner_number = 0; corner_number < 8; ++corner_number) {
+            nearest = std::min(nearest, block.value[node_number(i + (corner_number & 1), j + ((corner_number >> 1) & 1),
+                                                                k + (corner_number >> 2))][4]);
+          }
+          if (static_cast<double>(nearest) < half_diagonal) {
+            const Vector3<double> center = corner + cell_ * Vector3<double>(i + 0.5, j + 0.5, k + 0.5);
+            block.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)] =
+                surface_->closest_point(center, half_diagonal).has_value();
+          }
+        }
+      }
+    }
+  }
+
+  const BoundingVolumeHierarchy* surface_ = nullptr;
+  WallFunction plane_{};
+  double cell_ = 0;
+  Vector3<double> origin_ = Vector3<double>::Zero();
+  std::array<int, 3> blocks_{};
+  std::vector<std::int32_t> block_of_{};
+  std::vector<std::unique_ptr<Block>> block_data_{};
+};
+
+}  // namespace decant

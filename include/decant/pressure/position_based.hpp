@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Position-based fluids: particles are moved until the density is right, velocities follow.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <decant/core/batch.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
+#include <decant/pressure/concept.hpp>
+
+namespace decant {
+
+/// After Macklin and Mueller 2013, "Position based fluids" (ACM TOG 32). With the constraint C_i = rho_i / rho_0 - 1 <= 0
+/// of every particle at its predicted position x* = x + dt v, each sweep computes (eqs. 8, 9, 11, 12)
+///   lambda_i = -omega C_i / (sum_k |grad_k C_i|^2 + epsilon),
+///   dx_i     = (1 / rho_0) sum_j m_j (lambda_i + lambda_j) grad W_ij + 2 lambda_i grad phi_i
+/// and velocities become (x_new - x) / dt. Constraints only push: a sweep may take back what earlier ones pushed too far,
+/// and no more (the paper applies C_i of either sign or of positive sign only). Pair moves are mutual, so momentum is kept
+/// to rounding. Neighbours are those of the start, found a little beyond the support; walls enter linearised,
+/// phi(x*) = phi(x) + grad phi . (x* - x) - dt flux, and mirror lambda as they mirror pressure in PressureSystem.
+/// Robust with large steps, with an error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy.
+template <class ScalarType>
+class PositionBased {
+ public:
+  using Scalar = ScalarType;
+  static constexpr double search_margin = 0.1;
+
+  int most_iterations = 12;                ///< sweeps per sub-step, >= 1
+  Scalar density_tolerance = Scalar(1e-3);  ///< mean compression over the liquid that ends the sweeps [-]
+  /// omega [-], 0 < omega <= 1. All particles move at once, each as if the others stood still; at more than about a half
+  /// they overshoot together.
+  Scalar relaxation = Scalar(0.5);
+  /// epsilon over the denominator of a full neighbourhood [-], >= 0: softens particles with few neighbours.
+  Scalar softness = Scalar(0.01);
+
+  /// Nothing is carried from step to step.
+  struct Memory {
+    void reorder(std::span<const std::uint32_t>) noexcept {}
+    void clear() noexcept {}
+  };
+
+  Memory& memory() noexcept { return memory_; }
+
+  template <class Step>
+  Scalar largest_step(const Step&) const noexcept {
+    return std::numeric_limits<Scalar>::infinity();
+  }
+
+  template <class Step>
+  void begin_step(const Step&, PressureReport&) noexcept {}
+
+  template <class Step>
+  void solve(const Step& step, PressureReport& report) noexcept {
+    const Index count = step.fluid.size();
+    const Scalar dt = step.time_step;
+    if (count == 0 || !(dt > 0)) {
+      return;
+    }
+    records_.resize(4 * static_cast<std::size_t>(count));
+    factor_.resize(static_cast<std::size_t>(count));
+    total_.resize(static_cast<std::size_t>(count));
+    parallel_for(count, step.threads, [&](Index i) {
+      Scalar* record = &records_[static_cast<std::size_t>(4 * i)];
+      for (Index axis = 0; axis < 3; ++axis) {
+        record[axis] = dt * step.fluid.velocity(axis, i);
+      }
+      record[3] = step.fluid.mass[i];
+      total_[static_cast<std::size_t>(i)] = 0;
+    });
+    // Denominator of a lattice without walls, about: m / rho_0 is d^3, and |grad C|^2 adds up to some 1 / d^2.
+    const Scalar floor = std::max(softness, Scalar(1e-6)) / (step.spacing * step.spacing);
+    double error = 0;
+    int iterations = 0;
+    for (;;) {
+      error = find_factors(step, floor);
+      if (error <= static_cast<double>(density_tolerance) || iterations == most_iterations) {
+        break;  // the error belongs to the positions as they are: the factors are not used
+      }
+      move(step);
+      ++iterations;
+    }
+    report.density_iterations += iterations;
+    report.density_error = std::max(report.density_error, error);
+    report.converged = report.converged && error <= static_cast<double>(density_tolerance);
+    parallel_for(count, step.threads, [&](Index i) {
+      const Scalar* record = &records_[static_cast<std::size_t>(4 * i)];
+      step.fluid.velocity.col(i) = Vector3<Scalar>(record[0], record[1], record[2]) / dt;
+      // The moves of a pressure p are dx_i = -dt^2 sum_j m_j (p_i + p_j) / rho^2 grad W_ij.
+      step.fluid.pressure[i] = -total_[static_cast<std::size_t>(i)] * step.rest_density / (dt * dt);
+    });
+  }
+
+ private:
+  using B = Batch<Scalar>;
+
+  /// Separations at the predicted positions, pair by pair: those of the list and the difference of what was moved. Works
+  /// in periodic domains as well.
+  struct Moved {
+    B x, y, z, distance, mass;
+  };
+  template <class Pair>
+  [[gnu::always_inline]] Moved moved(const Pair& pair, const Scalar* own) const noexcept {
+    const auto other = gather4(records_.data(), pair.neighbor);
+    Moved result;
+    result.x = pair.x + (B(own[0]) - other.x);
+    result.y = pair.y + (B(own[1]) - other.y);
+    result.z = pair.z + (B(own[2]) - other.z);
+    result.distance = square_root(squared_length(result.x, result.y, result.z));
+    result.mass = other.w;
+    return result;
+  }
+
+  /// lambda of every particle; returns the mean compression.
+  template <class Step>
+  double find_factors(const Step& step, Scalar floor) noexcept {
+    using Kernel = typename Step::Kernel;
+    const Index count = step.fluid.size();
+    const Scalar h = step.smoothing_length;
+    const Scalar rho = step.rest_density;
+    const double compression = reduction_.over(
+        count, step.threads, 0.0,
+        [&](Index begin, Index end) {
+          double partial = 0;
+          for (Index i = begin; i < end; ++i) {
+            const auto own = static_cast<std::size_t>(i);
+            const Scalar* record = &records_[4 * own];
+            B density(Scalar(0)), x(Scalar(0)), y(Scalar(0)), z(Scalar(0)), squares(Scalar(0));
+            step.neighbors.for_each_batch(i, [&](const auto& pair) {
+              const Moved at = moved(pair, record);
+              density += select(pair.valid, at.mass * Kernel::value(at.distance, h), B(Scalar(0)));
+              const B slope = at.mass * Kernel::derivative_over_radius(at.distance, h);
+              const B gx = slope * at.x, gy = slope * at.y, gz = slope * at.z;
+              x += gx;
+              y += gy;
+              z += gz;
+              squares += squared_length(gx, gy, gz) * (B(record[3]) / at.mass);
+            });
+            const Vector3<Scalar> wall = step.walls.gradient.col(i);
+            const Scalar fraction = step.walls.share[i] + wall[0] * record[0] + wall[1] * record[1] +
+                                    wall[2] * record[2] - step.time_step * step.walls.flux[i];
+            const Scalar share = std::max(fraction, Scalar(0));
+            const Scalar excess = (sum(density) + record[3] * Kernel::value(Scalar(0), h)) / rho + share - 1;
+            partial += static_cast<double>(std::max(excess, Scalar(0)));
+            const Vector3<Scalar> pairs = Vector3<Scalar>(sum(x), sum(y), sum(z)) / rho;
+            const Scalar response = std::max(sum(squares) / (rho * rho) + (pairs + wall).squaredNorm(), Scalar(0));
+            // constraints only push; total_ holds what was pushed so far and may be taken back, but not beyond
+            const Scalar wanted = -relaxation * excess / (response + floor);
+            factor_[own] = std::min(wanted, -total_[own]);
+          }
+          return partial;
+        },
+        [](double a, double b) { return a + b; });
+    return compression / static_cast<double>(count);
+  }
+
+  template <class Step>
+  void move(const Step& step) noexcept {
+    using Kernel = typename Step::Kernel;
+    const Index count = step.fluid.size();
+    const Scalar h = step.smoothing_length;
+    next_.resize(records_.size());
+    parallel_for(count, step.threads, [&](Index i) {
+      const auto own = static_cast<std::size_t>(i);
+      const Scalar* record = &records_[4 * own];
+      const B own_factor(factor_[own]);
+      B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
+      step.neighbors.for_each_batch(i, [&](const auto& pair) {
+        const Moved at = moved(pair, record);
+        const B push = at.mass * (own_factor + gather(factor_.data(), pair.neighbor)) *
+                       Kernel::derivative_over_radius(at.distance, h);
+        x = multiply_add(push, at.x, x);
+        y = multiply_add(push, at.y, y);
+        z = multiply_add(push, at.z, z);
+      });
+      const Vector3<Scalar> wall = step.walls.gradient.col(i);
+      total_[own] += factor_[own];
+      Scalar* next = &next_[4 * own];
+      const Scalar scale = 1 / step.rest_density;
+      next[0] = record[0] + scale * sum(x) + factor_[own] * wall[0];
+      next[1] = record[1] + scale * sum(y) + factor_[own] * wall[1];
+      next[2] = record[2] + scale * sum(z) + factor_[own] * wall[2];
+      next[3] = record[3];
+    });
+    records_.swap(next_);
+  }
+
+  Memory memory_{};
+  std::vector<Scalar> records_{}, next_{};  ///< move since the start of the sub-step [m], mass
+  std::vector<Scalar> factor_{};            ///< lambda of this sweep [m^2]
+  std::vector<Scalar> total_{};             ///< of all sweeps
+  Reduction<double> reduction_{};
+};
+
+}  // namespace decant

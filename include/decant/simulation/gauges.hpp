@@ -1,0 +1,314 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Readings that an experimenter would take of the liquid: levels, fronts, wall pressures, volumes, highest points.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include <decant/boundary/cavity.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/core/fluid_state.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/core/types.hpp>
+#include <decant/neighbor/cell_grid.hpp>
+
+namespace decant {
+
+/// Takes readings of particles at one instant: observe() first, then any number of readings. SI units, world frame, up
+/// is +z. Particles with non-finite coordinates are passed over.
+///
+/// A particle stands for a cube of one spacing, so surfaces lie half a spacing beyond the outermost centres. Which
+/// droplets are left out: liquid is one piece where particles are within two spacings of each other (they feel each
+/// other), and the bulk is the largest piece.
+template <class ScalarType>
+class Gauges {
+ public:
+  using Scalar = ScalarType;
+
+  /// @param spacing of the particles [m], > 0.
+  explicit Gauges(double spacing) : spacing_(spacing) {
+    expects(spacing > 0 && std::isfinite(spacing), "Gauges: spacing [m]", "> 0 and finite", spacing);
+  }
+
+  /// Readings are of this liquid from now on; it is not owned and must not change between here and the readings.
+  void observe(const FluidState<Scalar>& fluid, Threads threads = {}) {
+    fluid_ = &fluid;
+    grid_.rebuild(fluid.position, static_cast<Scalar>(reach()), threads);
+    pieces_known_ = false;
+  }
+
+  /// Height of the free surface above (x, y) [m]: the top of the lowest column that stands on something. Nothing where
+  /// no such column is there. @param stands bool(const Vector3<double>& x): is there something solid within 1.5 spacings
+  /// below x, or can liquid not fall from there for another reason?
+  template <class Stands>
+  std::optional<double> level(double x, double y, Stands&& stands) const {
+    std::vector<Vector3<double>> column;
+    for (Index i = 0; i < count(); ++i) {
+      const Vector3<double> p = position(i);
+      if (std::hypot(p.x() - x, p.y() - y) < reach() && std::isfinite(p.z())) {
+        column.push_back(p);
+      }
+    }
+    std::sort(column.begin(), column.end(), [](const auto& a, const auto& b) { return a.z() < b.z(); });
+    for (std::size_t begin = 0; begin < column.size();) {
+      std::size_t end = begin + 1;
+      while (end < column.size() && column[end].z() - column[end - 1].z() < 1.5 * spacing_) {
+        ++end;
+      }
+      if (stands(column[begin])) {
+        return surface_over(x, y, {column.begin() + static_cast<std::ptrdiff_t>(begin),
+                                   column.begin() + static_cast<std::ptrdiff_t>(end)});
+      }
+      begin = end;
+    }
+    return std::nullopt;
+  }
+
+  /// The bulk's furthest x [m]. Nothing without liquid.
+  std::optional<double> front() {
+    find_pieces();
+    const std::uint32_t bulk = largest_piece([](Index) { return true; });
+    std::optional<double> furthest;
+    for (Index i = 0; i < count(); ++i) {
+      if (piece_[static_cast<std::size_t>(i)] == bulk && !(furthest && *furthest >= position(i).x())) {
+        furthest = position(i).x();
+      }
+    }
+    return furthest ? std::optional<double>(*furthest + 0.5 * spacing_) : std::nullopt;
+  }
+
+  /// Pressure at a point of a wall or in the liquid [Pa]: a linear fit to the particles within two spacings, 0 where
+  /// there are none (a dry wall), never less than 0.
+  double pressure(const Vector3<double>& point) const {
+    // unknowns: pressure at the point, its gradient times the spacing
+    Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();
+    Eigen::Vector4d right = Eigen::Vector4d::Zero();
+    double weights = 0;
+    int found = 0;
+    grid_.for_each_near(point.cast<Scalar>(), [&](Index i, Scalar) {
+      const Vector3<double> apart = (position(i) - point) / spacing_;
+      const double weight = std::pow(std::max(0.0, 1 - apart.squaredNorm() / 4), 2);
+      const Eigen::Vector4d row(1, apart.x(), apart.y(), apart.z());
+      normal += weight * row * row.transpose();
+      right += weight * static_cast<double>(fluid_->pressure[i]) * row;
+      weights += weight;
+      ++found;
+    });
+    if (!(weights > 0)) {
+      return 0;
+    }
+    // held near zero where few particles, or all in a plane, say little about the gradient
+    const double stiffness = (found < 4 ? 1.0 : found < 8 ? 0.02 : 0.002) * weights;
+    normal.diagonal().tail<3>().array() += stiffness;
+    const double value = normal.ldlt().solve(right)[0];
+    return std::isfinite(value) ? std::max(value, 0.0) : 0.0;
+  }
+
+  /// Liquid in a container [m^3]: that of the particles in its cavity.
+  double volume_in(const Cavity& cavity, const Pose& world_from_body) const {
+    const Pose body_from_world = world_from_body.inverse();
+    Index inside = 0;
+    for (Index i = 0; i < count(); ++i) {
+      inside += cavity.contains(body_from_world * position(i)) ? 1 : 0;
+    }
+    return static_cast<double>(inside) * spacing_ * spacing_ * spacing_;
+  }
+
+  /// Highest point of the liquid along a body's own z axis, in the body's frame [m]; of the liquid within the body's
+  /// `bounds` across that axis, the largest piece counts. Nothing where there is none.
+  /// Each particle at the surface gets a plane fitted to the surface around it, which evens out its noise, and
+  /// counts to where that plane leaves the particle's own cube: the liquid climbs on from its centre to the wall.
+  std::optional<double> top(const Pose& world_from_body, const Eigen::AlignedBox3d& bounds) {
+    find_pieces();
+    const Pose body_from_world = world_from_body.inverse();
+    in_body_.resize(static_cast<std::size_t>(count()));
+    const auto place = [&](Index i) -> Vector3<double>& { return in_body_[static_cast<std::size_t>(i)]; };
+    const auto within = [&](Index i) {
+      const Vector3<double>& x = place(i);
+      return x.x() >= bounds.min().x() && x.x() <= bounds.max().x() && x.y() >= bounds.min().y() &&
+             x.y() <= bounds.max().y();
+    };
+    for (Index i = 0; i < count(); ++i) {
+      place(i) = body_from_world * position(i);
+    }
+    const std::uint32_t bulk = largest_piece(within);
+    const auto belongs = [&](Index i) { return piece_[static_cast<std::size_t>(i)] == bulk && within(i); };
+    double highest = -std::numeric_limits<double>::infinity();
+    for (Index i = 0; i < count(); ++i) {
+      highest = belongs(i) ? std::max(highest, place(i).z()) : highest;
+    }
+    if (!std::isfinite(highest)) {
+      return std::nullopt;
+    }
+    // planes fitted to noise differ from the particles by less than this
+    const double lowest = highest - 3 * spacing_;
+    surface_.clear();
+    for (Index i = 0; i < count(); ++i) {
+      if (belongs(i) && place(i).z() > lowest - fit_reach * spacing_) {
+        bool covered = false;
+        grid_.for_each(i, [&](Index j, Scalar) { covered = covered || covers(place(j) - place(i)); });
+        if (!covered) {
+          surface_.push_back(place(i));
+        }
+      }
+    }
+    const Eigen::Map<const PointArray<double>> points(surface_.empty() ? nullptr : surface_.front().data(), 3,
+                                                      static_cast<Index>(surface_.size()));
+    surface_grid_.rebuild(points, fit_reach * spacing_);
+    const auto weight_of = [](const Vector3<double>& apart) {
+      return std::max(0.0, 1 - apart.squaredNorm() / (fit_reach * fit_reach));
+    };
+    // twice: planes fitted to particles, then the planes around each particle blended
+    plane_.resize(surface_.size());
+    for (Index i = 0; i < points.cols(); ++i) {
+      Plane plane;
+      plane.add({0, 0, 0}, 1);
+      surface_grid_.for_each(i, [&](Index j, double) {
+        const Vector3<double> apart = (points.col(j) - points.col(i)) / spacing_;
+        plane.add(apart, weight_of(apart));
+      });
+      plane_[static_cast<std::size_t>(i)] = plane.solve();
+    }
+    double best = -std::numeric_limits<double>::infinity();
+    for (Index i = 0; i < points.cols(); ++i) {
+      if (points(2, i) <= lowest) {
+        continue;
+      }
+      Vector3<double> sum = plane_[static_cast<std::size_t>(i)];
+      double weights = 1;
+      surface_grid_.for_each(i, [&](Index j, double) {
+        const Vector3<double> apart = (points.col(j) - points.col(i)) / spacing_;
+        const Vector3<double>& plane = plane_[static_cast<std::size_t>(j)];
+        const double weight = weight_of(apart);
+        sum[0] += weight * (apart.z() + plane[0] - plane[1] * apart.x() - plane[2] * apart.y());
+        sum.template tail<2>() += weight * plane.template tail<2>();
+        weights += weight;
+      });
+      const Vector3<double> blend = sum / weights;
+      // a plane steeper than 45 degrees is no surface that a plane describes
+      const double climb = 0.5 * std::min(1.0, blend.template tail<2>().norm());
+      best = std::max(best, points(2, i) + spacing_ * (blend[0] + climb + 0.5));
+    }
+    return std::isfinite(best) ? std::optional<double>(best) : highest + 0.5 * spacing_;
+  }
+
+ private:
+  // z = a + b x + c y by weighted least squares.
+  struct Plane {
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+
+    void add(const Vector3<double>& x, double weight) {
+      const Eigen::Vector3d row(1, x.x(), x.y());
+      normal += weight * row * row.transpose();
+      right += weight * x.z() * row;
+    }
+
+    // The slope is held at zero where there are too few points for one.
+    Eigen::Vector3d solve() const {
+      Eigen::Matrix3d held = normal;
+      held.diagonal().tail<2>().array() += 0.05 * normal(0, 0);
+      return held.ldlt().solve(right);
+    }
+  };
+
+  // Planes are fitted over so many spacings: wide enough to even out the places of single particles; crests narrower
+  // than this are flattened.
+  static constexpr double fit_reach = 3;
+
+  double reach() const { return 2 * spacing_; }
+  Index count() const { return fluid_ == nullptr ? 0 : fluid_->size(); }
+  Vector3<double> position(Index i) const { return fluid_->position.col(i).template cast<double>(); }
+
+  // Whether a particle at that offset hides one from above: within 35 degrees of the vertical.
+  static bool covers(const Vector3<double>& apart) { return apart.z() > 1.43 * apart.template head<2>().norm(); }
+
+  double surface_over(double x, double y, const std::vector<Vector3<double>>& column) const {
+    Plane plane;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (auto p = column.begin(); p != column.end(); ++p) {
+      // sorted by height: only what follows can cover it
+      const bool covered = std::any_of(p + 1, column.end(), [&](const Vector3<double>& other) {
+        const Vector3<double> apart = other - *p;
+        return apart.z() < reach() && covers(apart);
+      });
+      if (covered) {
+        continue;
+      }
+      const Vector3<double> apart((p->x() - x) / spacing_, (p->y() - y) / spacing_, p->z() / spacing_);
+      plane.add(apart, std::max(1e-6, 1 - apart.template head<2>().squaredNorm() / 4));
+      low = std::min(low, p->z());
+      high = std::max(high, p->z());
+    }
+    return std::clamp(spacing_ * plane.solve()[0], low, high) + 0.5 * spacing_;
+  }
+
+  // Numbers the connected pieces: piece_[i] is the lowest index in i's piece.
+  void find_pieces() {
+    if (pieces_known_) {
+      return;
+    }
+    piece_.resize(static_cast<std::size_t>(count()));
+    std::iota(piece_.begin(), piece_.end(), 0U);
+    const auto root = [&](std::uint32_t i) {
+      while (piece_[i] != i) {
+        piece_[i] = piece_[piece_[i]];
+        i = piece_[i];
+      }
+      return i;
+    };
+    for (Index i = 0; i < count(); ++i) {
+      grid_.for_each(i, [&](Index j, Scalar) {
+        if (j < i) {
+          const std::uint32_t a = root(static_cast<std::uint32_t>(i)), b = root(static_cast<std::uint32_t>(j));
+          piece_[std::max(a, b)] = std::min(a, b);
+        }
+      });
+    }
+    for (Index i = 0; i < count(); ++i) {
+      piece_[static_cast<std::size_t>(i)] = root(static_cast<std::uint32_t>(i));
+      if (!position(i).allFinite()) {
+        piece_[static_cast<std::size_t>(i)] = none;
+      }
+    }
+    pieces_known_ = true;
+  }
+
+  // The piece that has the most particles for which `counts`.
+  template <class Counts>
+  std::uint32_t largest_piece(Counts&& counts) {
+    size_.assign(piece_.size(), 0);
+    std::uint32_t largest = none;
+    for (Index i = 0; i < count(); ++i) {
+      const std::uint32_t piece = piece_[static_cast<std::size_t>(i)];
+      if (piece != none && counts(i)) {
+        ++size_[piece];
+        largest = largest == none || size_[piece] > size_[largest] ? piece : largest;
+      }
+    }
+    // `none` marks particles too, so without any piece the answer must match nothing
+    return largest == none ? none - 1 : largest;
+  }
+
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+  double spacing_;
+  const FluidState<Scalar>* fluid_ = nullptr;
+  CellGrid<Scalar> grid_{};
+  bool pieces_known_ = false;
+  std::vector<std::uint32_t> piece_, size_;
+  std::vector<Vector3<double>> in_body_, surface_, plane_;
+  CellGrid<double> surface_grid_{};
+};
+
+}  // namespace decant

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Liquid that pours in from a round opening.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/types.hpp>
+
+namespace decant {
+
+/// What an inlet is asked to do.
+struct InletSettings {
+  Vector3<double> position = Vector3<double>::Zero();        ///< centre of the opening, world frame [m]
+  Vector3<double> direction = -Vector3<double>::UnitZ();     ///< of the flow; normalised
+  double radius = 0.01;                                      ///< of the opening [m], > 0
+  std::vector<std::pair<double, double>> flow{};             ///< (time [s], flow [m^3/s]), linear between, 0 outside
+};
+
+/// Hands out layers of particles, one spacing thick, whenever enough volume has come in. Plug flow: each layer leaves
+/// with the speed that the flow has over the opening, so that successive layers are one spacing apart.
+class Inlet {
+ public:
+  /// @param spacing particle spacing [m].
+  Inlet(InletSettings settings, double spacing) : settings_(std::move(settings)), spacing_(spacing) {
+    expects(settings_.position.allFinite(), "Inlet: position [m]", "finite", settings_.position.transpose());
+    expects(settings_.direction.allFinite() && settings_.direction.norm() > 1e-9, "Inlet: direction",
+            "a finite vector other than zero", settings_.direction.transpose());
+    expects(settings_.radius > 0 && settings_.radius < 1e3 * spacing, "Inlet: radius [m]", "> 0 and below 1000 spacings",
+            settings_.radius);
+    for (std::size_t k = 0; k < settings_.flow.size(); ++k) {
+      expects(std::isfinite(settings_.flow[k].first) && (k == 0 || settings_.flow[k].first > settings_.flow[k - 1].first),
+              "Inlet: time [s] of the flow", "finite and increasing", settings_.flow[k].first);
+      expects(settings_.flow[k].second >= 0 && std::isfinite(settings_.flow[k].second), "Inlet: flow [m^3/s]",
+              ">= 0 and finite", settings_.flow[k].second);
+    }
+    settings_.direction.normalize();
+    const Vector3<double> across = settings_.direction.unitOrthogonal();
+    const Vector3<double> along = settings_.direction.cross(across);
+    const int reach = static_cast<int>(std::ceil(settings_.radius / spacing));
+    for (int i = -reach; i <= reach; ++i) {
+      for (int j = -reach; j <= reach; ++j) {
+        const Vector3<double> offset = spacing * (i * across + j * along);
+        if (offset.norm() <= settings_.radius) {
+          layer_.push_back(settings_.position + offset);
+        }
+      }
+    }
+  }
+
+  /// Volume flow at a time [m^3/s].
+  double flow(double time) const noexcept {
+    const auto& table = settings_.flow;
+    if (table.empty() || time < table.front().first || time > table.back().first) {
+      return 0;
+    }
+    for (std::size_t k = 1; k < table.size(); ++k) {
+      if (time <= table[k].first) {
+        const double t = (time - table[k - 1].first) / (table[k].first - table[k - 1].first);
+        return table[k - 1].second + t * (table[k].second - table[k - 1].second);
+      }
+    }
+    return table.back().second;
+  }
+
+  /// Lets time pass; calls emit(position, velocity) for each particle that has come in meanwhile.
+  template <class Emit>
+  void advance(double time, double time_step, Emit&& emit) {
+    const double rate = flow(time + 0.5 * time_step);
+    const double layer_volume = static_cast<double>(layer_.size()) * spacing_ * spacing_ * spacing_;
+    pending_ += rate * time_step;
+    const double speed = rate / (layer_volume / spacing_);
+    while (pending_ >= layer_volume) {
+      pending_ -= layer_volume;
+      // the layer passed the opening a moment ago
+      const double travelled = rate > 0 ? speed * pending_ / rate : 0;
+      for (const Vector3<double>& place : layer_) {
+        emit(Vector3<double>(place + travelled * settings_.direction), Vector3<double>(speed * settings_.direction));
+      }
+    }
+  }
+
+  const InletSettings& settings() const noexcept { return settings_; }
+
+ private:
+  InletSettings settings_;
+  double spacing_;
+  double pending_ = 0;  ///< volume that came in since the last layer [m^3]
+  std::vector<Vector3<double>> layer_{};
+};
+
+}  // namespace decant

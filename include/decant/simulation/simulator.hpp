@@ -1,0 +1,614 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The simulator: liquid among rigid bodies, put together from parts at compile time and stepped frame by frame.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <decant/boundary/rigid_bodies.hpp>
+#include <decant/boundary/wall_state.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/core/fluid_state.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/core/types.hpp>
+#include <decant/force/concept.hpp>
+#include <decant/kernel/concept.hpp>
+#include <decant/neighbor/concept.hpp>
+#include <decant/neighbor/neighbor_list.hpp>
+#include <decant/pressure/concept.hpp>
+#include <decant/simulation/inlet.hpp>
+#include <decant/simulation/liquid.hpp>
+#include <decant/simulation/parts.hpp>
+#include <decant/simulation/step_report.hpp>
+
+namespace decant {
+
+/// What every simulator needs to know, whatever its parts.
+struct SimulatorSettings {
+  double spacing = 0.005;                           ///< particle spacing d [m], > 0
+  Liquid liquid{};                                  ///< rest density, viscosity, surface tension
+  Vector3<double> gravity{0, 0, -9.81};             ///< [m/s^2], world frame
+  double support_in_spacings = 2;                   ///< support radius over d, 1.5 .. 4
+  double largest_step = 0.005;                      ///< longest sub-step [s], > 0
+  double courant_number = 0.4;                      ///< how many spacings anything may move per sub-step, 0 < .. <= 1
+  double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
+  int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
+  double numerical_viscosity = 0.02;                ///< added to the liquid's, in units of d sqrt(g d): 2e-5 m^2/s at
+                                                    ///< 5 mm. Calms motion from particle to particle; vanishes as the
+                                                    ///< spacing does. >= 0
+  Threads threads{};                                ///< 0: all
+};
+
+/// Throws std::invalid_argument if a setting is out of range.
+inline void validate(const SimulatorSettings& settings) {
+  validate(settings.liquid);
+  expects(settings.spacing >= 1e-5 && settings.spacing <= 10, "SimulatorSettings: spacing [m]", "1e-5 .. 10",
+          settings.spacing);
+  expects(settings.gravity.allFinite() && settings.gravity.norm() < 1e4, "SimulatorSettings: gravity [m/s^2]",
+          "finite and below 1e4", settings.gravity.transpose());
+  expects(settings.support_in_spacings >= 1.5 && settings.support_in_spacings <= 4,
+          "SimulatorSettings: support_in_spacings", "1.5 .. 4", settings.support_in_spacings);
+  expects(settings.largest_step > 0 && std::isfinite(settings.largest_step), "SimulatorSettings: largest_step [s]",
+          "> 0 and finite", settings.largest_step);
+  expects(settings.courant_number > 0 && settings.courant_number <= 1, "SimulatorSettings: courant_number",
+          "> 0 and <= 1", settings.courant_number);
+  expects(settings.fixed_step >= 0 && std::isfinite(settings.fixed_step), "SimulatorSettings: fixed_step [s]",
+          ">= 0 and finite", settings.fixed_step);
+  expects(settings.numerical_viscosity >= 0 && settings.numerical_viscosity < 100,
+          "SimulatorSettings: numerical_viscosity", ">= 0 and < 100", settings.numerical_viscosity);
+  expects(settings.most_sub_steps > 0, "SimulatorSettings: most_sub_steps", "> 0", settings.most_sub_steps);
+  expects(settings.threads.count >= 0 && settings.threads.count <= 1024, "SimulatorSettings: threads", "0 .. 1024",
+          settings.threads.count);
+}
+
+/// A liquid simulation composed of Parts (see simulation/parts.hpp). Holds no global state: any number of differently
+/// composed simulators can live side by side. Not safe to call from several threads at once; copies are independent.
+template <class Parts = DefaultParts<>>
+class Simulator {
+ public:
+  using Scalar = typename Parts::Scalar;
+  using Domain = typename Parts::Domain;
+  using Kernel = typename Parts::Kernel;
+  using Search = typename Parts::NeighborSearch;
+  using Forces = typename Parts::Forces;
+  using Solver = typename Parts::PressureSolver;
+  using Boundary = typename Parts::Boundary;
+  using Neighbors = NeighborList<Scalar, Domain>;
+  using Step = StepView<Kernel, Neighbors>;
+
+  static_assert(SmoothingKernel<Kernel>, "Parts::Kernel must model decant::SmoothingKernel, see <decant/kernel/concept.hpp>");
+  static_assert(NeighborSearch<Search>,
+                "Parts::NeighborSearch must model decant::NeighborSearch, see <decant/neighbor/concept.hpp>");
+  static_assert(PressureSolver<Solver, Step>,
+                "Parts::PressureSolver must model decant::PressureSolver, see <decant/pressure/concept.hpp>");
+  static_assert([]<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
+    return (ForceTerm<Terms, Step> && ...);
+  }(std::type_identity<Forces>{}), "every type in Parts::Forces must model decant::ForceTerm, see <decant/force/concept.hpp>");
+
+  /// Throws std::invalid_argument if a setting is out of range.
+  explicit Simulator(const SimulatorSettings& settings = {}, const Domain& domain = {})
+      : settings_(settings), domain_(domain), search_(domain) {
+    validate(settings_);
+    smoothing_length_ =
+        settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
+    last_step_ = settings_.largest_step;
+    configure_forces();
+  }
+
+  // ---- the scene --------------------------------------------------------------------------------------------------
+
+  /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the body
+  /// is put is pushed out of its material.
+  BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
+    const BodyId body = bodies_.template add<Kernel>(std::move(name), std::move(shape), std::move(motion), slip,
+                                                     smoothing_length_, settings_.spacing, settings_.threads);
+    bodies_.set_interval(time_, 0);
+    bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+    return body;
+  }
+
+  /// Replaces a body's motion, from now on.
+  void set_motion(BodyId body, PoseTrack motion) {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    bodies_.set_motion(body, std::move(motion));
+  }
+
+  /// Lets a body move from where it is to `pose` during the next `duration` > 0 [s]: for poses that arrive frame by
+  /// frame.
+  void move_body(BodyId body, const Pose& pose, double duration) {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    expects(duration > 0 && std::isfinite(duration), "Simulator: duration of a body's move [s]", "> 0 and finite",
+            duration);
+    const Pose now = bodies_[body].motion.at(time_);
+    bodies_.set_motion(body, PoseTrack({{time_, now}, {time_ + duration, pose}}));
+  }
+
+  /// Adds particles of one spacing's volume each. @param position, velocity 3xN, [m] and [m/s], world frame, finite.
+  void add_particles(const ConstPointsView<Scalar>& position, const ConstPointsView<Scalar>& velocity, Origin origin) {
+    expects(position.cols() == velocity.cols(), "Simulator: number of velocities", "that of positions", velocity.cols());
+    expects(position.allFinite(), "Simulator: positions of new particles", "finite", "NaN or infinity");
+    expects(velocity.allFinite(), "Simulator: velocities of new particles", "finite", "NaN or infinity");
+    for (Index k = 0; k < position.cols(); ++k) {
+      append(position.col(k), velocity.col(k), origin);
+    }
+  }
+
+  /// Adds an inlet; its liquid gets `origin`.
+  void add_inlet(const InletSettings& inlet, Origin origin) { inlets_.push_back({Inlet(inlet, settings_.spacing), origin}); }
+
+  /// Removes all particles for which f(index) is true. @return how many.
+  template <class Predicate>
+  Index remove_particles_if(Predicate&& f) {
+    std::vector<std::uint32_t> kept;
+    for (Index i = 0; i < fluid_.size(); ++i) {
+      if (!f(i)) {
+        kept.push_back(static_cast<std::uint32_t>(i));
+      }
+    }
+    const Index removed = fluid_.size() - static_cast<Index>(kept.size());
+    if (removed > 0) {
+      reorder(kept);
+      fluid_.resize(static_cast<Index>(kept.size()));
+    }
+    return removed;
+  }
+
+  // ---- stepping ---------------------------------------------------------------------------------------------------
+
+  /// Simulates `frame_time` >= 0 [s] in as many sub-steps as accuracy asks for. Never throws; a frame that fails leaves
+  /// the state as it was and says why.
+  [[nodiscard]] StepReport step(double frame_time) noexcept {
+    StepReport report;
+    if (!(frame_time >= 0) || !std::isfinite(frame_time)) {
+      report.status = StepStatus::bad_time_step;
+      return report;
+    }
+    remember();
+    const double end = time_ + frame_time;
+    bool converged = true;
+    while (report.status == StepStatus::ok && time_ < end) {
+      if (report.sub_steps >= settings_.most_sub_steps) {
+        report.status = StepStatus::too_many_steps;
+        break;
+      }
+      const double left = end - time_;
+      double time_step = choose_step(left, report.sub_steps);
+      if (time_step <= 0) {
+        report.status = fluid_finite() ? StepStatus::too_many_steps : StepStatus::non_finite;
+        break;
+      }
+      const double reached = time_step < left ? time_ + time_step : end;
+      time_step = reached - time_;
+      converged = sub_step(time_step, report) && converged;
+      time_ = reached;
+      ++report.sub_steps;
+    }
+    if (report.status == StepStatus::ok) {
+      report.non_finite = count_non_finite();
+      if (report.non_finite > 0) {
+        report.status = StepStatus::non_finite;
+      }
+    }
+    if (report.status != StepStatus::ok) {
+      recall();
+    } else if (!converged) {
+      report.status = StepStatus::not_converged;
+    }
+    lost_ += report.advanced() ? report.lost : 0;
+    report.lost = lost_;
+    summarize(report);
+    return report;
+  }
+
+  /// Lets the liquid come to rest with all bodies held where they are: steps with friction, at most `most_time` [s] of
+  /// them, until the mean speed is below `speed` [m/s]. Time does not advance, and velocities are zero afterwards.
+  StepReport settle(double most_time = 2.0, double speed = 0.005) {
+    const double start = time_;
+    Boundary moving = bodies_;
+    for (BodyId body = 0; body < bodies_.size(); ++body) {
+      bodies_.set_motion(body, PoseTrack(moving[body].motion.at(start)));
+    }
+    std::vector<InletWithOrigin> inlets;
+    inlets.swap(inlets_);
+    StepReport report;
+    const double slice = 0.02;
+    for (double spent = 0; spent < most_time && fluid_.size() > 0; spent += slice) {
+      report = step(slice);
+      if (!report.advanced()) {
+        break;
+      }
+      const double mean_square = 2 * report.kinetic_energy / std::max(total_mass(), 1e-300);
+      if (spent > 2 * slice && mean_square < speed * speed) {
+        break;
+      }
+      fluid_.velocity *= Scalar(0.5);
+    }
+    fluid_.velocity.setZero();
+    solver_.memory().clear();
+    inlets_.swap(inlets);
+    bodies_ = std::move(moving);
+    time_ = start;
+    return report;
+  }
+
+  // ---- what there is ----------------------------------------------------------------------------------------------
+
+  /// The particles; may be read and written between frames (positions, velocities), without a copy. To add or remove
+  /// particles use the functions above.
+  FluidState<Scalar>& fluid() noexcept { return fluid_; }
+  const FluidState<Scalar>& fluid() const noexcept { return fluid_; }
+
+  const Boundary& bodies() const noexcept { return bodies_; }
+  const SimulatorSettings& settings() const noexcept { return settings_; }
+  const Domain& domain() const noexcept { return domain_; }
+  double time() const noexcept { return time_; }  ///< [s]
+  double smoothing_length() const noexcept { return smoothing_length_; }  ///< [m]
+
+  /// A part, to read or change its settings.
+  template <class Force>
+  Force& force() noexcept { return std::get<Force>(forces_); }
+  Solver& pressure_solver() noexcept { return solver_; }
+
+  /// As of the last sub-step: what walls contributed at each particle. In the order of fluid().
+  const WallState<Scalar>& walls() const noexcept { return walls_; }
+
+  /// Force of the liquid on a body as of the last sub-step, by pressure [N], world frame.
+  Vector3<double> pressure_force_on(BodyId body) const noexcept {
+    Vector3<double> total = Vector3<double>::Zero();
+    for (Index i = 0; i < fluid_.size() && i < walls_.share.count(); ++i) {
+      const WallContact<Scalar>* contacts = walls_.contacts_of(i);
+      const double density = std::max(static_cast<double>(fluid_.density[i]), settings_.liquid.density);
+      const double push = static_cast<double>(fluid_.mass[i]) * settings_.liquid.density *
+                          static_cast<double>(fluid_.pressure[i]) / (density * density);
+      for (int k = 0; k < walls_.contact_count[i]; ++k) {
+        if (contacts[k].body == body) {
+          total += push * contacts[k].gradient.template cast<double>();
+        }
+      }
+    }
+    return total;
+  }
+
+  // ---- snapshots --------------------------------------------------------------------------------------------------
+
+  /// All that the future depends on. A run that is restored continues bit for bit as the first one did.
+  struct Snapshot {
+    FluidState<Scalar> fluid;
+    typename Solver::Memory memory;
+    Boundary bodies;
+    double time, last_step;
+    std::uint32_t next_id;
+    Index lost;
+    std::vector<std::pair<Inlet, Origin>> inlets;
+  };
+
+  Snapshot snapshot() const {
+    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, last_step_, next_id_, lost_, inlets_};
+  }
+
+  void restore(const Snapshot& snapshot) {
+    fluid_ = snapshot.fluid;
+    solver_.memory() = snapshot.memory;
+    bodies_ = snapshot.bodies;
+    time_ = snapshot.time;
+    last_step_ = snapshot.last_step;
+    next_id_ = snapshot.next_id;
+    lost_ = snapshot.lost;
+    inlets_ = snapshot.inlets;
+  }
+
+ private:
+  using InletWithOrigin = std::pair<Inlet, Origin>;
+
+  /// Parts that know gravity, viscosity or surface tension by these names take them from the settings.
+  void configure_forces() {
+    std::apply([this](auto&... terms) { (this->configure(terms), ...); }, forces_);
+  }
+  template <class Force>
+  void configure(Force& term) {
+    if constexpr (requires { term.acceleration = settings_.gravity.template cast<Scalar>(); }) {
+      term.acceleration = settings_.gravity.template cast<Scalar>();
+    }
+    if constexpr (requires { term.kinematic_viscosity = Scalar(0); }) {
+      term.kinematic_viscosity = static_cast<Scalar>(
+          settings_.liquid.kinematic_viscosity() +
+          settings_.numerical_viscosity * settings_.spacing * std::sqrt(settings_.gravity.norm() * settings_.spacing));
+    }
+    if constexpr (requires { term.surface_tension = Scalar(0); }) {
+      term.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
+    }
+  }
+
+  void append(const Vector3<Scalar>& position, const Vector3<Scalar>& velocity, Origin origin) {
+    const Index i = fluid_.size();
+    fluid_.resize(i + 1);
+    fluid_.position.col(i) = position;
+    fluid_.velocity.col(i) = velocity;
+    fluid_.mass[i] = particle_mass();
+    fluid_.density[i] = static_cast<Scalar>(settings_.liquid.density);
+    fluid_.pressure[i] = 0;
+    fluid_.id[i] = next_id_++;
+    fluid_.origin[i] = origin;
+  }
+
+  Scalar particle_mass() const noexcept {
+    return static_cast<Scalar>(settings_.liquid.density * settings_.spacing * settings_.spacing * settings_.spacing);
+  }
+
+  double total_mass() const noexcept { return fluid_.mass.template cast<double>().sum(); }
+
+  Step view(double time_step) noexcept {
+    return {fluid_,
+            neighbors_,
+            walls_,
+            shift_,
+            static_cast<Scalar>(smoothing_length_),
+            static_cast<Scalar>(settings_.spacing),
+            static_cast<Scalar>(settings_.liquid.density),
+            static_cast<Scalar>(time_step),
+            time_,
+            settings_.threads};
+  }
+
+  /// The longest sub-step that is accurate and stable now, at most `left`; 0 if there is none.
+  double choose_step(double left, int taken) noexcept {
+    if (settings_.fixed_step > 0) {
+      // a rest that is only rounding would make a sub-step of no length
+      return left < settings_.fixed_step * (1 + 1e-9) ? left : settings_.fixed_step;
+    }
+    double longest = settings_.largest_step;
+    const double fluid_speed = largest_speed();
+    const double body_speed = bodies_.largest_speed(time_, std::min(left, longest));
+    const double speed = std::max(fluid_speed, body_speed);
+    if (!std::isfinite(speed)) {
+      return 0;
+    }
+    if (speed > 0) {
+      longest = std::min(longest, settings_.courant_number * settings_.spacing / speed);
+    }
+    const Step step = view(longest);
+    longest = std::min(longest, static_cast<double>(solver_.largest_step(step)));
+    std::apply(
+        [&](auto&... terms) {
+          ((longest = std::min(longest, static_cast<double>(terms.largest_step(step)))), ...);
+        },
+        forces_);
+    if (!(longest > 0) || left / longest > settings_.most_sub_steps - taken + 1) {
+      return 0;
+    }
+    return left / std::ceil(left / longest - 1e-9);
+  }
+
+  double largest_speed() noexcept {
+    return std::sqrt(reduction_.over(
+        fluid_.size(), settings_.threads, 0.0,
+        [&](Index begin, Index end) {
+          double largest = 0;
+          for (Index i = begin; i < end; ++i) {
+            const double squared = static_cast<double>(fluid_.velocity.col(i).squaredNorm());
+            largest = squared <= largest ? largest : squared;  // a NaN takes over and stays
+          }
+          return largest;
+        },
+        [](double a, double b) { return b <= a ? a : b; }));
+  }
+
+  /// @return whether the pressure solver converged.
+  bool sub_step(double time_step, StepReport& report) noexcept {
+    last_step_ = time_step;
+    bodies_.set_interval(time_, time_step);
+    pour_in(time_step);
+    find_neighbors();
+    compute_densities();
+
+    const Step step = view(time_step);
+    PressureReport pressure;
+    shift_.set_count(fluid_.size());
+    shift_.setZero();
+    solver_.begin_step(step, pressure);
+    acceleration_.resize(3, fluid_.size());
+    acceleration_.setZero();
+    std::apply([&](auto&... terms) { (terms.accumulate(step, acceleration_), ...); }, forces_);
+    parallel_for(fluid_.size(), settings_.threads,
+                 [&](Index i) { fluid_.velocity.col(i) += step.time_step * acceleration_.col(i); });
+    solver_.solve(step, pressure);
+    advance(time_step, report);
+
+    report.density_iterations += pressure.density_iterations;
+    report.divergence_iterations += pressure.divergence_iterations;
+    report.density_error = std::max(report.density_error, pressure.density_error);
+    report.divergence_error = std::max(report.divergence_error, pressure.divergence_error);
+    return pressure.converged;
+  }
+
+  void pour_in(double time_step) noexcept {
+    for (auto& [inlet, origin] : inlets_) {
+      inlet.advance(time_, time_step, [&, from = origin](const Vector3<double>& x, const Vector3<double>& v) {
+        append(x.cast<Scalar>(), v.cast<Scalar>(), from);
+      });
+    }
+  }
+
+  void find_neighbors() noexcept {
+    const double support = settings_.spacing * settings_.support_in_spacings;
+    const Scalar reach = static_cast<Scalar>(support * (1 + static_cast<double>(Solver::search_margin)));
+    search_.rebuild(fluid_.position, reach, settings_.threads);
+    if constexpr (requires { search_.order(); }) {
+      const auto order = search_.order();
+      reorder({order.data(), order.size()});
+      search_.adopt_order(settings_.threads);
+    }
+    neighbors_.build_from(search_, fluid_.position, settings_.threads);
+    bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
+    shield_neighbors();
+  }
+
+  /// Liquid on two sides of a wall must not feel each other.
+  void shield_neighbors() noexcept {
+    if (bodies_.size() == 0) {
+      return;
+    }
+    neighbors_.remove_if([&](Index i, Index j) { return behind(i, j) && hidden(i, j); }, settings_.threads);
+  }
+
+  /// Cheap first questions, of which a pair that a wall separates passes both: the two are farther apart than both
+  /// walls are near, and one of them is behind the plane that touches the wall nearest to the other.
+  bool behind(Index i, Index j) const noexcept {
+    if (walls_.contact_count[i] == 0 || walls_.contact_count[j] == 0) {
+      return false;
+    }
+    const Vector3<Scalar> apart = fluid_.position.col(j) - fluid_.position.col(i);
+    // looked-up distances may be off by a fraction of a grid cell; a tenth covers that
+    const Scalar walls_between = Scalar(0.9) * (walls_.distance[i] + walls_.distance[j]);
+    return apart.squaredNorm() > walls_between * walls_between && (beyond_wall_of(i, apart) || beyond_wall_of(j, -apart));
+  }
+  bool beyond_wall_of(Index i, const Vector3<Scalar>& apart) const noexcept {
+    const Vector3<Scalar> into = walls_.gradient.col(i);
+    const Scalar depth = apart.dot(into);
+    const Scalar reach = Scalar(0.5) * walls_.distance[i];
+    return depth > 0 && depth * depth > reach * reach * into.squaredNorm();
+  }
+  bool hidden(Index i, Index j) const noexcept {
+    // the same question from both ends, so that pairs stay symmetric
+    const Index a = std::min(i, j), b = std::max(i, j);
+    const Vector3<Scalar> x_a = fluid_.position.col(a), x_b = fluid_.position.col(b);
+    return bodies_.separated(x_a, x_b, walls_.contacts_of(a), walls_.contact_count[a]) ||
+           bodies_.separated(x_a, x_b, walls_.contacts_of(b), walls_.contact_count[b]);
+  }
+
+  void compute_densities() noexcept {
+    const Scalar h = static_cast<Scalar>(smoothing_length_);
+    const Scalar rest_density = static_cast<Scalar>(settings_.liquid.density);
+    const Scalar own = Kernel::value(Scalar(0), h);
+    const Scalar* mass = fluid_.mass.data();
+    parallel_for(fluid_.size(), settings_.threads, [&](Index i) {
+      Batch<Scalar> total(Scalar(0));
+      neighbors_.for_each_batch(i, [&](const auto& pair) {
+        const auto share = gather(mass, pair.neighbor) * Kernel::value(square_root(pair.distance_squared), h);
+        total += select(pair.valid, share, Batch<Scalar>(Scalar(0)));
+      });
+      fluid_.density[i] = sum(total) + mass[i] * own + rest_density * walls_.share[i];
+    });
+  }
+
+  void advance(double time_step, StepReport& report) noexcept {
+    before_ = fluid_.position;
+    const Scalar dt = static_cast<Scalar>(time_step);
+    parallel_for(fluid_.size(), settings_.threads,
+                 [&](Index i) { fluid_.position.col(i) += dt * fluid_.velocity.col(i) + shift_.col(i); });
+    const GuardReport guard =
+        bodies_.guard(before_, time_step, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    report.guarded += guard.slid + guard.stopped;
+    report.lost += guard.lost;
+    if constexpr (Domain::periodic) {
+      parallel_for(fluid_.size(), settings_.threads, [&](Index i) {
+        fluid_.position.col(i) = domain_.wrap(Vector3<Scalar>(fluid_.position.col(i)));
+      });
+    }
+  }
+
+  /// Puts the particles into another order: place k gets what was at order[k].
+  void reorder(std::span<const std::uint32_t> order) {
+    fluid_.each([&](auto& array) {
+      auto& moved = scratch_of(array);
+      moved.set_count(static_cast<Index>(order.size()));
+      parallel_for(static_cast<Index>(order.size()), settings_.threads, [&](Index k) {
+        const auto from = static_cast<Index>(order[static_cast<std::size_t>(k)]);
+        if constexpr (std::decay_t<decltype(array)>::RowsAtCompileTime == 3) {
+          moved.col(k) = array.col(from);
+        } else {
+          moved[k] = array[from];
+        }
+      });
+      std::swap(moved, array);
+    });
+    solver_.memory().reorder(order);
+  }
+
+  auto& scratch_of(Growable<Scalar, 3>&) noexcept { return scratch_points_; }
+  auto& scratch_of(Growable<Scalar, 1>&) noexcept { return scratch_scalars_; }
+  auto& scratch_of(Growable<std::uint32_t, 1>&) noexcept { return scratch_numbers_; }
+
+  void remember() {
+    kept_fluid_ = fluid_;
+    kept_memory_ = solver_.memory();
+    kept_inlets_ = inlets_;
+    kept_time_ = time_;
+    kept_last_step_ = last_step_;
+    kept_next_id_ = next_id_;
+  }
+
+  void recall() {
+    fluid_ = kept_fluid_;
+    solver_.memory() = kept_memory_;
+    inlets_ = kept_inlets_;
+    time_ = kept_time_;
+    last_step_ = kept_last_step_;
+    next_id_ = kept_next_id_;
+  }
+
+  bool fluid_finite() const noexcept { return fluid_.position.allFinite() && fluid_.velocity.allFinite(); }
+
+  Index count_non_finite() const noexcept {
+    Index count = 0;
+    for (Index i = 0; i < fluid_.size(); ++i) {
+      count += fluid_.position.col(i).allFinite() && fluid_.velocity.col(i).allFinite() ? 0 : 1;
+    }
+    return count;
+  }
+
+  void summarize(StepReport& report) const noexcept {
+    report.particles = fluid_.size();
+    double energy = 0, mass = 0;
+    for (Index i = 0; i < fluid_.size(); ++i) {
+      const double m = static_cast<double>(fluid_.mass[i]);
+      mass += m;
+      energy += 0.5 * m * static_cast<double>(fluid_.velocity.col(i).squaredNorm());
+    }
+    report.kinetic_energy = energy;
+    report.volume = mass / settings_.liquid.density;
+  }
+
+  SimulatorSettings settings_;
+  Domain domain_;
+  double smoothing_length_ = 0;
+  Search search_;
+  Forces forces_{};
+  Solver solver_{};
+  Boundary bodies_{};
+  std::vector<InletWithOrigin> inlets_{};
+
+  FluidState<Scalar> fluid_{};
+  Neighbors neighbors_{};
+  WallState<Scalar> walls_{};
+  double time_ = 0;
+  double last_step_ = 0;
+  std::uint32_t next_id_ = 0;
+  Index lost_ = 0;
+
+  // scratch, and the state before the frame for frames that fail
+  PointArray<Scalar> acceleration_{};
+  Growable<Scalar, 3> before_{};
+  Growable<Scalar, 3> shift_{};
+  Growable<Scalar, 3> scratch_points_{};
+  Growable<Scalar, 1> scratch_scalars_{};
+  Growable<std::uint32_t, 1> scratch_numbers_{};
+  Reduction<double> reduction_{};
+  FluidState<Scalar> kept_fluid_{};
+  typename Solver::Memory kept_memory_{};
+  std::vector<InletWithOrigin> kept_inlets_{};
+  double kept_time_ = 0, kept_last_step_ = 0;
+  std::uint32_t kept_next_id_ = 0;
+};
+
+/// The ready-made simulator.
+using LiquidSimulator = Simulator<DefaultParts<>>;
+
+}  // namespace decant

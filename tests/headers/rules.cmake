@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+# What a reader may rely on in every header under INCLUDE, checked by text:
+# - only io/ opens files or prints; only core/parallel.hpp speaks OpenMP; only neighbor/kd_tree.hpp includes nanoflann;
+# - #pragma once, an SPDX line, no `using namespace`, no macros but DECANT_*.
+cmake_minimum_required(VERSION 3.22)
+
+file(GLOB_RECURSE headers RELATIVE "${INCLUDE}" "${INCLUDE}/*.hpp")
+if(NOT headers)
+  message(FATAL_ERROR "no headers under '${INCLUDE}'")
+endif()
+
+set(complaints "")
+function(forbid header text pattern reason)
+  if(text MATCHES "${pattern}")
+    string(STRIP "${CMAKE_MATCH_0}" found)
+    set(complaints "${complaints}\n  ${header}: '${found}': ${reason}" PARENT_SCOPE)
+  endif()
+endfunction()
+
+foreach(header IN LISTS headers)
+  file(READ "${INCLUDE}/${header}" text)
+  if(NOT text MATCHES "^// SPDX-License-Identifier: MIT\n#pragma once\n")
+    string(APPEND complaints "\n  ${header}: begins with the SPDX line and #pragma once")
+  endif()
+  string(REGEX REPLACE "//[^\n]*" "" text "${text}")  # comments may name what code may not
+  if(NOT header MATCHES "^decant/io/")
+    forbid(${header} "${text}" "# *include *<(iostream|fstream|filesystem|cstdio|stdio.h|print)>"
+           "only headers in io/ open files or print")
+    forbid(${header} "${text}" "(^|[^a-z_])(f?printf|fopen|getenv|std::c(out|err|log))[^a-z_]"
+           "only headers in io/ open files or print")
+    forbid(${header} "${text}" "# *include *<(nlohmann/[a-z.]*|png.h|decant/io/[a-z_./]*)>"
+           "only headers in io/ need what decant::io brings")
+  endif()
+  if(NOT header STREQUAL "decant/core/parallel.hpp")
+    forbid(${header} "${text}" "# *pragma +omp +(parallel|for|task)[^\n]*|# *include *<omp.h>"
+           "OpenMP stays behind core/parallel.hpp")
+  endif()
+  if(NOT header STREQUAL "decant/neighbor/kd_tree.hpp")
+    forbid(${header} "${text}" "# *include *[<\"]nanoflann[^\n]*" "nanoflann stays behind neighbor/kd_tree.hpp")
+  endif()
+  forbid(${header} "${text}" "\n *using +namespace[^\n]*" "a header must not open a namespace for its readers")
+  if(header MATCHES "^decant/(version|core/parallel)\\.hpp$")
+    forbid(${header} "${text}" "# *define +([^D]|D[^E]|DE[^C])[^\n]*" "macros begin with DECANT_")
+  else()
+    forbid(${header} "${text}" "# *define +[^\n]*" "macros stand in version.hpp and core/parallel.hpp only")
+  endif()
+endforeach()
+
+if(complaints)
+  message(FATAL_ERROR "headers that break a rule:${complaints}")
+endif()

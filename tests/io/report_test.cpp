@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// Reports: escaping, base64, axes, lines that keep their extremes and gaps, nothing fetched from elsewhere.
+
+#include <decant/io/report.hpp>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "catch.hpp"
+#include "temporary_folder.hpp"
+
+TEST_CASE("report: base64 of RFC 4648") {
+  using decant::detail::base64;
+  CHECK(base64("").empty());
+  CHECK(base64("f") == "Zg==");
+  CHECK(base64("fo") == "Zm8=");
+  CHECK(base64("foobar") == "Zm9vYmFy");
+  CHECK(base64(std::string("\xff\x00\xfe", 3)) == "/wD+");
+}
+
+TEST_CASE("report: ticks are round and cover the range") {
+  using decant::detail::Ticks;
+  const Ticks ticks(-0.3, 28.9, 6);
+  CHECK(ticks.step == 5);
+  CHECK(ticks.first == -5);
+  CHECK(ticks.last == 30);
+  CHECK(ticks.values().size() == 8);
+  CHECK(ticks.text(5) == "5");
+  const Ticks small(0, 0.0123, 6);
+  CHECK(small.step == Approx(0.005));
+  CHECK(small.text(0.005) == "0.005");
+  CHECK(Ticks(0, 3e7, 6).text(1e7) == "1e+07");
+  for (const double value : {0.0, 5.0, -3e9, std::nan("")}) {  // no range, or none that is finite
+    const Ticks one(value, value, 6);
+    INFO(value);
+    CHECK(one.last > one.first);
+    CHECK(one.values().size() < 20);
+  }
+}
+
+TEST_CASE("report: a thinned line keeps its highest and lowest points and its gaps") {
+  decant::LineChart::Line line;
+  for (int k = 0; k < 10000; ++k) {
+    line.x.push_back(k);
+    line.y.push_back(k == 7777 ? 50 : k == 1234 ? -50 : k == 5000 ? std::nan("") : std::sin(k));
+  }
+  const auto thin = decant::detail::thinned(line, 100);
+  CHECK(thin.x.size() < 310);
+  CHECK(std::count(thin.y.begin(), thin.y.end(), 50) == 1);
+  CHECK(std::count(thin.y.begin(), thin.y.end(), -50) == 1);
+  CHECK(std::any_of(thin.y.begin(), thin.y.end(), [](double y) { return std::isnan(y); }));
+  CHECK(std::is_sorted(thin.x.begin(), thin.x.end()));
+}
+
+TEST_CASE("report: a chart draws each point where it belongs") {
+  const decant::LineChart chart{"t", "time [s]", "height [mm]",
+                                {{"a", {0, 1, 2, 3, 4}, {0, 10, std::nan(""), 10, 0}, false}, {"b<", {0, 4}, {5, 5}, true}}};
+  const std::string svg = decant::detail::chart_svg(chart);
+  // x from 70 to 864, y from 282 (0) up to 34 (10); the gap starts a new stroke
+  CHECK(svg.find("d=\"M70.0 282.0L268.5 34.0M665.5 34.0L864.0 282.0\"") != std::string::npos);
+  CHECK(svg.find("d=\"M70.0 158.0L864.0 158.0\"") != std::string::npos);
+  CHECK(svg.find("b&lt;") != std::string::npos);
+  CHECK(svg.find("time [s]") != std::string::npos);
+  CHECK(svg.find("height [mm]") != std::string::npos);
+  CHECK(svg.find("nan") == std::string::npos);
+  CHECK(decant::detail::chart_svg({"empty", "x", "y", {}}).find("nan") == std::string::npos);
+}
+
+TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
+  const decant_test::TemporaryFolder folder("report");
+  decant::HtmlReport report("a <b> & c");
+  report.heading("h<1>");
+  report.paragraph("\"quoted\" & <script>");
+  decant::Table table({"name", "value"});
+  table.add({"x<y", "1"});
+  report.table(table);
+  report.chart({"chart", "x", "y", {{"line", {0, 1}, {0, 1}, false}}});
+  decant::Picture picture(2, 2);
+  report.picture(picture, "two by two");
+  report.film({{0.0, decant::png_bytes(picture)}, {0.5, decant::png_bytes(picture)}}, "film");
+  report.write(folder.path() / "r.html");
+  const std::string html = decant::detail::read_text_file(folder.path() / "r.html", 1 << 20);
+  CHECK(html.find("<h1>a &lt;b&gt; &amp; c</h1>") != std::string::npos);
+  CHECK(html.find("<h2>h&lt;1&gt;</h2>") != std::string::npos);
+  CHECK(html.find("<p>&quot;quoted&quot; &amp; &lt;script&gt;</p>") != std::string::npos);
+  CHECK(html.find("<td>x&lt;y</td><td>1</td>") != std::string::npos);
+  CHECK(html.find("const times = [0.000,0.500];") != std::string::npos);
+  CHECK(html.find("data:image/png;base64,iVBORw0KGgo") != std::string::npos);
+  for (const char* foreign : {"http:", "https:", "//cdn", "@import", "<link"}) {
+    INFO(foreign);
+    CHECK(html.find(foreign) == std::string::npos);
+  }
+  CHECK_THROWS_WITH(report.chart({"c", "x", "y", {{"line", {0, 1}, {0}, false}}}),
+                    "LineChart: numbers of x and y of a line must be equal, y has, got 1");
+  CHECK_THROWS_AS(report.write(folder.path() / "no/such/folder/r.html"), std::runtime_error);
+}

@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
+# Installs what is missing, builds everything and runs every test. Ends with the line `N passed, N failed`; the exit
+# status is 0 only if there are tests and all of them passed.
+# Environment: DECANT_TEST_JOBS, how many compilers and tests run side by side (all cores unless given);
+# DECANT_SHARED_DATA_DIR, a folder of measurements that some tests compare with; DECANT_BUILD_DIR, build/ unless given;
+# CI=true makes warnings errors and builds the benchmarks, too.
+# Arguments go to ctest: ./tests/run.sh -LE slow
+set -uo pipefail
+
+cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
+jobs=${DECANT_TEST_JOBS:-$(nproc)}
+build=${DECANT_BUILD_DIR:-build}
+measurements=${DECANT_SHARED_DATA_DIR:-}
+if [[ -z $measurements && -d ../shared/data ]]; then
+  measurements=$(cd ../shared/data && pwd)
+fi
+for_ci=OFF
+if [[ ${CI:-} == true ]]; then
+  for_ci=ON
+fi
+
+give_up() {
+  echo "$1" >&2
+  echo "0 passed, 1 failed"
+  exit 1
+}
+
+./cmake/install_dependencies.sh catch2 || give_up "The tests did not start."
+cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=ON -DDECANT_BUILD_EXAMPLES=ON \
+  -DDECANT_BUILD_BENCHMARKS="$for_ci" -DDECANT_WARNINGS_AS_ERRORS="$for_ci" \
+  -DDECANT_SHARED_DATA_DIR="$measurements" || give_up "Configuring failed."
+cmake --build "$build" --parallel "$jobs" || give_up "Building failed."
+
+results=$build/test-results.xml
+rm -f "$results"
+ctest --test-dir "$build" --output-on-failure --no-tests=error --parallel "$jobs" --output-junit "$PWD/$results" "$@"
+status=$?
+[[ -s $results ]] || give_up "No tests ran."
+
+# the counts stand in the attributes of <testsuite>
+count() {
+  tr '\n\t' '  ' <"$results" | grep -o '<testsuite [^>]*>' | grep -o " $1=\"[0-9]*\"" | head -n 1 | tr -dc 0-9
+}
+tests=$(count tests)
+skipped=$(($(count skipped) + $(count disabled)))
+failed=$(count failures)
+passed=$((tests - skipped - failed))
+if ((skipped > 0)); then
+  echo "$skipped skipped"
+fi
+if ((passed == 0 && failed == 0)); then
+  give_up "No tests ran."
+fi
+echo "$passed passed, $failed failed"
+((status == 0 && failed == 0))

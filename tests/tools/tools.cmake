@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: MIT
+# Runs TOOL as CASE says, in an empty folder SCRATCH.
+cmake_minimum_required(VERSION 3.22)
+
+file(REMOVE_RECURSE "${SCRATCH}")
+file(MAKE_DIRECTORY "${SCRATCH}")
+
+# run(STATUS ARGUMENTS...): the tool has to end with that exit status; its output is left in `output`.
+function(run status)
+  execute_process(COMMAND "${TOOL}" ${ARGN} WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result
+                  OUTPUT_VARIABLE output ERROR_VARIABLE errors)
+  if(NOT result STREQUAL status)
+    message(FATAL_ERROR "exit status ${result} instead of ${status}:\n${output}\n${errors}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+  set(errors "${errors}" PARENT_SCOPE)
+endfunction()
+
+# A refusal is one line that names what is wrong.
+function(expect_one_line text part)
+  string(STRIP "${text}" text)
+  if(text MATCHES "\n" OR NOT text MATCHES "${part}")
+    message(FATAL_ERROR "expected one line that names ${part}, got:\n${text}")
+  endif()
+endfunction()
+
+function(expect_keys file)
+  file(READ "${file}" json)
+  foreach(key IN LISTS ARGN)
+    string(REPLACE "." ";" path "${key}")
+    string(JSON type ERROR_VARIABLE problem TYPE "${json}" ${path})
+    if(problem)
+      message(FATAL_ERROR "${file} has no ${key}: ${problem}")
+    endif()
+  endforeach()
+endfunction()
+
+set(scene_head "{\"format\": \"decant-scene\", \"version\": 1, \"name\": \"drop\", \"record_hz\": 100")
+set(scene_tail "\"bodies\": [{\"name\": \"box\", \"shape\": {\"box_inside\": {\"min_m\": [0, 0, 0], \"max_m\": [0.1, 0.05, 0.1]}, \"open\": \"+z\"}}],
+  \"fluid\": [{\"box\": {\"min_m\": [0, 0, 0], \"max_m\": [0.05, 0.05, 0.05]}}], \"gauges\": [\"front_mm\", \"volume_ml@box\"]}")
+
+if(CASE STREQUAL "simulate_runs_a_scene")
+  file(WRITE "${SCRATCH}/scene.json" "${scene_head}, \"spacing_m\": 0.01, \"end_s\": 0.1, ${scene_tail}")
+  run(0 scene.json --json out.json --report out.html --vtk vtk)
+  expect_keys("${SCRATCH}/out.json" series series.t_s series.front_mm series.volume_ml@box particles lost spilled
+              sub_steps iterations density_error_max volume_ml peak_rss_mb wall_s threads status)
+  file(READ "${SCRATCH}/out.json" json)
+  string(JSON status GET "${json}" status)
+  string(JSON particles GET "${json}" particles)
+  string(JSON lost GET "${json}" lost)
+  string(JSON times LENGTH "${json}" series t_s)
+  string(JSON last GET "${json}" series t_s 10)
+  if(NOT status STREQUAL ok OR NOT particles EQUAL 125 OR NOT lost EQUAL 0 OR NOT times EQUAL 11
+     OR NOT last MATCHES "^(0\\.1|0\\.0999|0\\.1000)")
+    message(FATAL_ERROR "status ${status}, ${particles} particles, ${lost} lost, ${times} times up to ${last}")
+  endif()
+  foreach(file IN ITEMS out.html vtk/all.pvd)
+    if(NOT EXISTS "${SCRATCH}/${file}")
+      message(FATAL_ERROR "no ${file} was written")
+    endif()
+  endforeach()
+
+elseif(CASE STREQUAL "simulate_refuses_a_bad_scene")
+  run(2 missing.json --json out.json)
+  expect_one_line("${errors}" "missing.json")
+  file(WRITE "${SCRATCH}/scene.json" "${scene_head}, \"spacing_m\": -0.01, \"end_s\": 0.1, ${scene_tail}")
+  run(2 scene.json --json out.json)
+  expect_one_line("${errors}" "spacing_m.*-0.01")
+  file(WRITE "${SCRATCH}/scene.json" "${scene_head}, \"spacing_m\": 0.01")
+  run(2 scene.json --json out.json)
+  expect_one_line("${errors}" "scene.json")
+  file(WRITE "${SCRATCH}/scene.json" "${scene_head}, \"spacing_m\": 0.01, \"end_s\": 0.1, \"endd_s\": 1, ${scene_tail}")
+  run(2 scene.json --json out.json)
+  expect_one_line("${errors}" "endd_s")
+
+elseif(CASE STREQUAL "replay_motion_reports")
+  set(motion TRD_2D_0.3m_2.4s_270deg)
+  # a coarse and short run: that it works; how well it agrees with the measurement is for the physics tests
+  run(0 --poses "${SOURCE}/examples/data/pose_${motion}.csv" --heights "${SOURCE}/examples/data/height_${motion}.csv"
+      --radius-mm 49 --depth-mm 78 --spacing-mm 10 --decay-s 1 --json out.json --report out.html)
+  expect_keys("${SCRATCH}/out.json" peak_mm measured_peak_mm correlation time_shift_s decay_frequency_hz
+              measured_frequency_hz damping_ratio lost wall_s series.t_s series.height_mm)
+  if(NOT EXISTS "${SCRATCH}/out.html" OR NOT output MATCHES "out.html")
+    message(FATAL_ERROR "the report is missing, or the output does not say where it is:\n${output}")
+  endif()
+
+elseif(CASE STREQUAL "replay_motion_refuses_a_missing_file")
+  run(2 --poses missing.csv --heights missing.csv --radius-mm 49 --depth-mm 78 --json out.json)
+  expect_one_line("${errors}" "missing.csv")
+
+else()
+  message(FATAL_ERROR "no case '${CASE}'")
+endif()
