@@ -23,6 +23,7 @@
 #include <decant/io/scene.hpp>
 #include <decant/io/series_file.hpp>
 #include <decant/io/table.hpp>
+#include <decant/simulation/parts.hpp>
 
 #include "support/result_file.hpp"
 #include "support/scene_run.hpp"
@@ -45,9 +46,9 @@ decant::Scene scene_of(const Arguments& arguments, const decant::PoseTrack& pose
   scene.record_rate = 120;  // twice the cameras' rate, so that peaks are not cut
   scene.liquid = {998.0, 0.001, 0.0728};
   const double radius = 1e-3 * arguments.radius_mm, depth = 1e-3 * arguments.depth_mm;
-  scene.bodies.push_back({"cylinder",
-                          decant::scene::CylinderInside{radius, depth + 3 * radius, 0.003, decant::scene::Face::PositiveZ}, poses, true,
-                          decant::scene::Slip::Free});
+  scene.bodies.push_back(
+      {"cylinder", decant::scene::CylinderInside{radius, depth + 3 * radius, 0.003, decant::scene::Face::PositiveZ},
+       poses, true, decant::scene::Slip::Free});
   // by volume: what the measured container holds is pi R^2 depth
   const double volume = std::numbers::pi * radius * radius * depth;
   scene.fluid.push_back(decant::scene::Fill{0, decant::scene::Fill::Amount::Volume, volume});
@@ -105,11 +106,11 @@ Comparison compare(const Arguments& arguments, const decant::PoseTrack& poses, c
   const double low = 0.75 * expected, high = 1.25 * expected;
   // the first tenths of a second still hold what the stop stirred up besides the lowest mode
   const double decay_begin = out.motion_end + 0.3;
-  out.decay = example::fit_decay({{time, *result.series.find("center_x_mm")}, {time, *result.series.find("center_y_mm")}},
-                                 decay_begin, run_end, low, high);
+  out.decay =
+      example::fit_decay({{time, *result.series.find("center_x_mm")}, {time, *result.series.find("center_y_mm")}},
+                         decay_begin, run_end, low, high);
   if (aligned) {
-    out.measured_decay =
-        example::fit_decay({out.measured}, shift + decay_begin, shift + out.motion_end + 8, low, high);
+    out.measured_decay = example::fit_decay({out.measured}, shift + decay_begin, shift + out.motion_end + 8, low, high);
   }
   return out;
 }
@@ -168,8 +169,9 @@ void write_report(const Arguments& arguments, const Comparison& c, const example
                    text(arguments.radius_mm, 1) + " mm, filled to " + text(arguments.depth_mm, 1) +
                    " mm; particles every " + text(arguments.spacing_mm, 2) + " mm.");
   report.table(summary(c, result, wall_seconds));
-  report.film(result.pictures, "The liquid as a camera that travels with the container sees it; lighter where it moves "
-                               "faster against the container. The dotted line in the charts marks the picture's time.");
+  report.film(result.pictures,
+              "The liquid as a camera that travels with the container sees it; lighter where it moves "
+              "faster against the container. The dotted line in the charts marks the picture's time.");
   decant::LineChart::Line measured{"measured", {}, {}, false};
   for (std::size_t k = 0; k < c.measured.time.size(); ++k) {
     const double t = c.measured.time[k] - c.alignment.shift;
@@ -178,16 +180,24 @@ void write_report(const Arguments& arguments, const Comparison& c, const example
       measured.y.push_back(c.measured.value[k]);
     }
   }
-  report.chart({"Highest point above the rest level, in the container's frame", "time [s]", "height [mm]",
+  report.chart({"Highest point above the rest level, in the container's frame",
+                "time [s]",
+                "height [mm]",
                 {{"simulated", c.simulated.time, c.simulated.value, false}, measured}});
-  report.chart({"Centre of mass beside the container's axis", "time [s]", "offset [mm]",
+  report.chart({"Centre of mass beside the container's axis",
+                "time [s]",
+                "offset [mm]",
                 {{"x", c.simulated.time, *result.series.find("center_x_mm"), false},
                  {"y", c.simulated.time, *result.series.find("center_y_mm"), false}}});
   report.paragraph(
-      "Peaks are taken over the whole record. The correlation is Pearson's over the poses' time, after the one time shift "
-      "that makes it highest. Frequency and damping are those of a decaying oscillation fitted from 0.3 s after the motion "
-      "on: to the offset of the centre of mass in the simulation, since the highest point of a whole surface rises twice a "
-      "period; to the height itself in the measurement, whose cameras see part of the surface and so the single period.");
+      "Peaks are taken over the whole record. The correlation is Pearson's over the poses' time, after the one time "
+      "shift "
+      "that makes it highest. Frequency and damping are those of a decaying oscillation fitted from 0.3 s after the "
+      "motion "
+      "on: to the offset of the centre of mass in the simulation, since the highest point of a whole surface rises "
+      "twice a "
+      "period; to the height itself in the measurement, whose cameras see part of the surface and so the single "
+      "period.");
   report.write(arguments.report);
 }
 
@@ -211,7 +221,7 @@ int run(const Arguments& arguments) {
   if (!arguments.vtk.empty()) {
     options.vtk_folder = arguments.vtk;
   }
-  const example::RunResult result = example::run_composition(scene_of(arguments, poses), options);
+  const example::RunResult result = example::run_scene<decant::DefaultParts<>>(scene_of(arguments, poses), options);
   const Comparison comparison = compare(arguments, poses, heights, result);
   const double wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 

@@ -17,6 +17,7 @@
 #include <decant/io/scene.hpp>
 #include <decant/io/table.hpp>
 
+#include "support/compositions.hpp"
 #include "support/result_file.hpp"
 #include "support/scene_run.hpp"
 
@@ -43,9 +44,14 @@ decant::Table summary(const example::RunResult& result) {
 // What a gauge's name says before its place, as a title with unit.
 std::string title_of(const std::string& kind) {
   const std::vector<std::pair<std::string, std::string>> titles = {
-      {"level_mm", "level [mm]"},   {"front_mm", "front [mm]"},   {"pressure_pa", "pressure [Pa]"},
-      {"volume_ml", "volume [ml]"}, {"top_mm", "highest point above the first level [mm]"},
-      {"force_n_x", "force x [N]"}, {"force_n_y", "force y [N]"}, {"force_n_z", "force z [N]"}};
+      {"level_mm", "level [mm]"},
+      {"front_mm", "front [mm]"},
+      {"pressure_pa", "pressure [Pa]"},
+      {"volume_ml", "volume [ml]"},
+      {"top_mm", "highest point above the first level [mm]"},
+      {"force_n_x", "force x [N]"},
+      {"force_n_y", "force y [N]"},
+      {"force_n_z", "force z [N]"}};
   for (const auto& [name, title] : titles) {
     if (name == kind) {
       return title;

@@ -53,7 +53,7 @@ inline nlohmann::json result_json(const RunResult& result, int threads) {
   json["unconverged_frames"] = result.unconverged_frames;
   json["density_error_max"] = result.density_error_max;
   json["volume_ml"] = 1e6 * result.volume;
-  json["peak_rss_mb"] = peak_memory_mb();
+  json["peak_rss_mb"] = detail::peak_memory_mb();
   json["wall_s"] = result.step_seconds;
   json["set_up_s"] = result.set_up_seconds;
   json["threads"] = threads;

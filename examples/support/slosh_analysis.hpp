@@ -71,8 +71,8 @@ struct Alignment {
   double correlation = 0;  ///< Pearson's, over the window; -1 where the records do not overlap
 };
 
-/// Pearson's correlation of a(t) and b(t + shift) over [begin, end] [s] of a's time, on a grid of `step` [s]. Grid points
-/// where either is missing are left out; -1 if that leaves less than nine tenths of them, or a constant record.
+/// Pearson's correlation of a(t) and b(t + shift) over [begin, end] [s] of a's time, on a grid of `step` [s]. Grid
+/// points where either is missing are left out; -1 if that leaves less than nine tenths of them, or a constant record.
 inline double correlation_at(const Record& a, const Record& b, double begin, double end, double shift,
                              double step = 0.005) {
   double n = 0, sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
@@ -97,8 +97,8 @@ inline double correlation_at(const Record& a, const Record& b, double begin, dou
   return spread > 0 ? (ab - sum_a * sum_b / n) / std::sqrt(spread) : -1;
 }
 
-/// The shift that correlates best over [begin, end] [s] of a's time, among all for which b covers the window: first every
-/// 20 ms (a tenth of the fastest slosh period here), then every millisecond around the best.
+/// The shift that correlates best over [begin, end] [s] of a's time, among all for which b covers the window: first
+/// every 20 ms (a tenth of the fastest slosh period here), then every millisecond around the best.
 inline Alignment align(const Record& a, const Record& b, double begin, double end) {
   Alignment best{0, -1};
   if (b.time.empty() || !(end > begin)) {

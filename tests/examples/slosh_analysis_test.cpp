@@ -32,7 +32,9 @@ Record sampled(double begin, double end, double step, Signal&& signal) {
 }
 
 // A motion's kind of signal: something rises at 1 s and swings until 6 s.
-double event(double t) { return t < 1 || t > 6 ? 0 : 20 * std::sin(2 * pi * 0.9 * (t - 1)) * std::sin(pi * (t - 1) / 5); }
+double event(double t) {
+  return t < 1 || t > 6 ? 0 : 20 * std::sin(2 * pi * 0.9 * (t - 1)) * std::sin(pi * (t - 1) / 5);
+}
 
 }  // namespace
 
@@ -56,7 +58,8 @@ TEST_CASE("slosh analysis: one time shift is found to the millisecond") {
   std::mt19937 random(7);
   std::normal_distribution<double> noise(0, 0.3);
   const Record simulated = sampled(0, 7, 0.01, event);
-  const Record measured = sampled(0, 20, 1 / 59.96, [&](double t) { return 1.3 * event(t - 8.137) + 0.8 + noise(random); });
+  const Record measured =
+      sampled(0, 20, 1 / 59.96, [&](double t) { return 1.3 * event(t - 8.137) + 0.8 + noise(random); });
   const Alignment found = align(simulated, measured, 0, 7);
   CHECK(found.shift == Approx(8.137).margin(0.002));
   CHECK(found.correlation > 0.995);
@@ -114,8 +117,8 @@ TEST_CASE("slosh analysis: measured free decays oscillate at 3.02 Hz") {
   }
   // recording times at which the motions start, as the data set's description has them
   const std::vector<std::pair<std::string, double>> motions = {
-      {"LE_2D_0m_5s_900deg", 10.96},     {"LE_3D_0m_5.3s_900deg", 8.09},   {"RD_2D_0.3m_6.5s_720deg", 7.96},
-      {"RD_3D_0.3m_6.8s_720deg", 8.32},  {"TRD_2D_0.3m_2.4s_270deg", 8.14}, {"TRD_2D_0.3m_2.6s_270deg", 8.57},
+      {"LE_2D_0m_5s_900deg", 10.96},    {"LE_3D_0m_5.3s_900deg", 8.09},    {"RD_2D_0.3m_6.5s_720deg", 7.96},
+      {"RD_3D_0.3m_6.8s_720deg", 8.32}, {"TRD_2D_0.3m_2.4s_270deg", 8.14}, {"TRD_2D_0.3m_2.6s_270deg", 8.57},
       {"TRD_3D_0.3m_3s_270deg", 7.09}};
   const double expected = cylinder_slosh_frequency(0.049, 0.078);
   for (const auto& [motion, start] : motions) {

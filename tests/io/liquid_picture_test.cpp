@@ -97,11 +97,11 @@ TEST_CASE("liquid picture: glass and edges before and behind the liquid") {
 TEST_CASE("liquid picture: drawing twice gives the same bytes and odd input does not crash") {
   decant::LiquidPainter painter(front_view());
   Eigen::Matrix3Xf x = Eigen::Matrix3Xf::Zero(3, 4);
-  x.col(1) << 0, -1, 0;                                       // at the eye
+  x.col(1) << 0, -1, 0;  // at the eye
   x.col(2) << std::numeric_limits<float>::infinity(), 0, 0;
   x.col(3) << 1e30F, 1e30F, 1e30F;
   decant::TriangleMesh odd = square(0);
-  odd.vertices.push_back({0, -1, 0});                         // a triangle that reaches the eye
+  odd.vertices.push_back({0, -1, 0});  // a triangle that reaches the eye
   odd.vertices.push_back({0, std::nan(""), 0});
   odd.triangles.push_back({0, 1, 4});
   odd.triangles.push_back({0, 1, 5});
@@ -114,8 +114,7 @@ TEST_CASE("liquid picture: drawing twice gives the same bytes and odd input does
 
 TEST_CASE("liquid picture: the view around a box shows all of it") {
   const Eigen::AlignedBox3d box(Eigen::Vector3d(1, 2, 3), Eigen::Vector3d(1.2, 2.1, 3.3));
-  const auto view =
-      decant::PictureView::around(box, {0.3, 1, -0.4}, decant::Vector3<double>::UnitZ(), 200, 150);
+  const auto view = decant::PictureView::around(box, {0.3, 1, -0.4}, decant::Vector3<double>::UnitZ(), 200, 150);
   decant::LiquidPainter painter(view);
   for (int corner = 0; corner < 8; ++corner) {
     const Eigen::Matrix3Xd x = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));

@@ -54,8 +54,11 @@ TEST_CASE("report: a thinned line keeps its highest and lowest points and its ga
 }
 
 TEST_CASE("report: a chart draws each point where it belongs") {
-  const decant::LineChart chart{"t", "time [s]", "height [mm]",
-                                {{"a", {0, 1, 2, 3, 4}, {0, 10, std::nan(""), 10, 0}, false}, {"b<", {0, 4}, {5, 5}, true}}};
+  const decant::LineChart chart{
+      "t",
+      "time [s]",
+      "height [mm]",
+      {{"a", {0, 1, 2, 3, 4}, {0, 10, std::nan(""), 10, 0}, false}, {"b<", {0, 4}, {5, 5}, true}}};
   const std::string svg = decant::detail::chart_svg(chart);
   // x from 70 to 864, y from 282 (0) up to 34 (10); the gap starts a new stroke
   CHECK(svg.find("d=\"M70.0 282.0L268.5 34.0M665.5 34.0L864.0 282.0\"") != std::string::npos);

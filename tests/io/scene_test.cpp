@@ -130,8 +130,8 @@ TEST_CASE("scene: every key of the format arrives in SI units") {
 
 TEST_CASE("scene: what may be left out") {
   const SceneFolder folder("scene_short");
-  const auto scene = folder.parse(
-      R"({"format": "decant-scene", "version": 1, "name": "a", "spacing_m": 0.01, "end_s": 1})");
+  const auto scene =
+      folder.parse(R"({"format": "decant-scene", "version": 1, "name": "a", "spacing_m": 0.01, "end_s": 1})");
   CHECK(scene.gravity == decant::Vector3<double>(0, 0, -9.81));
   CHECK(scene.composition == decant::scene::Composition::Default);
   CHECK_FALSE(scene.solver.density_error.has_value());
@@ -232,7 +232,8 @@ TEST_CASE("scene: a bad file is refused with one line that names key and value a
       {"\"top_mm@glass\"", "\"front_mm\"", "gauges[5] must be a gauge that is not listed yet"},
       {"\"top_mm@glass\"", "[]", "gauges[5] must be a string"},
       {"\"version\": 1,", "\"version\": 1, \"version\": 1,", "key \"version\" must be given once"},
-      {"\"version\": 1,", "\"version\": [[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]],", "nesting must be at most 16 levels deep"},
+      {"\"version\": 1,", "\"version\": [[[[[[[[[[[[[[[[[1]]]]]]]]]]]]]]]]],",
+       "nesting must be at most 16 levels deep"},
       {"\"version\": 1,", "\"vers", "must be JSON"},
   };
   for (const Case& c : cases) {

@@ -14,8 +14,7 @@
 TEST_CASE("series file: columns and missing values and names with places in them") {
   const auto series = decant::parse_series(
       "t_s,level_mm@2.66,0.5,\"pressure_pa@0.9,0.5,-2e-2\",front_mm\n0,1,2,3\n0.5,,-2.5e1,\n", "s.csv");
-  CHECK(series.names ==
-        std::vector<std::string>{"t_s", "level_mm@2.66,0.5", "pressure_pa@0.9,0.5,-2e-2", "front_mm"});
+  CHECK(series.names == std::vector<std::string>{"t_s", "level_mm@2.66,0.5", "pressure_pa@0.9,0.5,-2e-2", "front_mm"});
   REQUIRE(series.rows() == 2);
   CHECK(series.columns[2][1] == -25);
   CHECK(std::isnan(series.columns[1][1]));

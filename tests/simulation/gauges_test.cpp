@@ -20,7 +20,8 @@ constexpr double d = 0.01;  // spacing [m]
 
 // A block of liquid with a surface z = surface(x, y), jittered by a tenth of the spacing as a settled liquid is.
 template <class Scalar, class Surface>
-FluidState<Scalar> liquid(const Vector3<double>& min, const Vector3<double>& max, Surface&& surface, double jitter = 0.1) {
+FluidState<Scalar> liquid(const Vector3<double>& min, const Vector3<double>& max, Surface&& surface,
+                          double jitter = 0.1) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> offset(-jitter * d, jitter * d);
   std::vector<Vector3<double>> places;
@@ -78,7 +79,8 @@ TEMPLATE_TEST_CASE("gauges: level of the column that stands and not of what flie
 }
 
 TEMPLATE_TEST_CASE("gauges: the front is that of the bulk", "", float, double) {
-  auto fluid = liquid<TestType>({0, 0, 0}, {0.2, 0.1, 0.1}, [](double, double) { return 0.1; }, 0.0);
+  auto fluid = liquid<TestType>(
+      {0, 0, 0}, {0.2, 0.1, 0.1}, [](double, double) { return 0.1; }, 0.0);
   Gauges<TestType> gauges(d);
   gauges.observe(fluid);
   CHECK(gauges.front().value() == Approx(0.2));
@@ -143,7 +145,8 @@ TEMPLATE_TEST_CASE("gauges: the highest point in a tilted body's own frame", "",
   const Pose pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitY())), {3, 2, 1}};
   const auto in_world = [&](FluidState<TestType> state) {
     for (Index i = 0; i < state.size(); ++i) {
-      state.position.col(i) = (pose * Vector3<double>(state.position.col(i).template cast<double>())).template cast<TestType>();
+      state.position.col(i) =
+          (pose * Vector3<double>(state.position.col(i).template cast<double>())).template cast<TestType>();
     }
     return state;
   };

@@ -31,13 +31,18 @@ struct Threads {
   }
 };
 
+/// Loops over fewer entries per thread than this are not shared out (but for a grain of 1, which says that one is much).
+inline constexpr Index least_per_thread = 512;
+
 /// Calls f(begin, end) for consecutive ranges that cover [0, count). Ranges are of `grain` entries (the last may be
 /// shorter) whatever the number of threads. f must not throw.
 template <class Function>
 void parallel_ranges(Index count, Threads threads, Index grain, Function&& f) {
   const Index ranges = (count + grain - 1) / grain;
 #ifdef _OPENMP
-  const int workers = static_cast<int>(std::min<Index>(threads.resolved(), ranges));
+  // waking a thread costs as much as working through some hundred particles
+  const Index worth = grain == 1 ? ranges : count / least_per_thread;
+  const int workers = static_cast<int>(std::min<Index>(threads.resolved(), worth));
   if (workers > 1) {
 #pragma omp parallel for schedule(static) num_threads(workers)
     for (Index r = 0; r < ranges; ++r) {

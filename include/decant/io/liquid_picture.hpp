@@ -24,16 +24,16 @@ namespace decant {
 
 /// From where a picture is taken: a perspective view without distortion.
 struct PictureView {
-  Vector3<double> eye{0, -1, 0};                         ///< [m]
-  Vector3<double> target = Vector3<double>::Zero();      ///< what stands in the middle [m]
-  Vector3<double> up = Vector3<double>::UnitZ();         ///< not along the line of sight
-  double field_of_view = 0.5;                            ///< of the picture's height [rad]
-  int width = 640;                                       ///< [px]
-  int height = 480;                                      ///< [px]
+  Vector3<double> eye{0, -1, 0};                     ///< [m]
+  Vector3<double> target = Vector3<double>::Zero();  ///< what stands in the middle [m]
+  Vector3<double> up = Vector3<double>::UnitZ();     ///< not along the line of sight
+  double field_of_view = 0.5;                        ///< of the picture's height [rad]
+  int width = 640;                                   ///< [px]
+  int height = 480;                                  ///< [px]
 
   /// Looks along `direction` at the middle of a box, from where all of the box just fits into the picture.
-  static PictureView around(const Eigen::AlignedBox3d& box, const Vector3<double>& direction,
-                            const Vector3<double>& up, int width, int height) {
+  static PictureView around(const Eigen::AlignedBox3d& box, const Vector3<double>& direction, const Vector3<double>& up,
+                            int width, int height) {
     PictureView view;
     view.width = width;
     view.height = height;

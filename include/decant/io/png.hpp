@@ -32,8 +32,8 @@ struct Picture {
 
   /// The three bytes of a pixel.
   std::uint8_t* at(int row, int column) {
-    return &rgb[3 * (static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
-                     static_cast<std::size_t>(column))];
+    return &rgb[3 *
+                (static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column))];
   }
 };
 

@@ -18,7 +18,8 @@
 
 namespace decant {
 
-/// Shows how far a run from 0 to `total` has come, at most ten times a second. Silent where the stream is not a terminal.
+/// Shows how far a run from 0 to `total` has come, at most ten times a second. Silent where the stream is not a
+/// terminal.
 class Progress {
  public:
   /// `stream` must live as long as this object, which does not own it.

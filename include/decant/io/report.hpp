@@ -42,11 +42,20 @@ inline std::string html_text(std::string_view text) {
   std::string out;
   for (const char c : text) {
     switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
+      case '&':
+        out += "&amp;";
+        break;
+      case '<':
+        out += "&lt;";
+        break;
+      case '>':
+        out += "&gt;";
+        break;
+      case '"':
+        out += "&quot;";
+        break;
+      default:
+        out += c;
     }
   }
   return out;
@@ -171,9 +180,9 @@ inline std::string chart_svg(const LineChart& chart) {
                     "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\">\n";
   for (const double y : y_ticks.values()) {
     svg += "<line class=\"" + std::string(std::abs(y) < 1e-9 * y_ticks.step ? "zero" : "grid") + "\" x1=\"" +
-           point(left) + "\" x2=\"" + point(width - right) + "\" y1=\"" + point(y_at(y)) + "\" y2=\"" +
-           point(y_at(y)) + "\"/><text text-anchor=\"end\" x=\"" + point(left - 8) + "\" y=\"" + point(y_at(y) + 4) +
-           "\">" + y_ticks.text(y) + "</text>\n";
+           point(left) + "\" x2=\"" + point(width - right) + "\" y1=\"" + point(y_at(y)) + "\" y2=\"" + point(y_at(y)) +
+           "\"/><text text-anchor=\"end\" x=\"" + point(left - 8) + "\" y=\"" + point(y_at(y) + 4) + "\">" +
+           y_ticks.text(y) + "</text>\n";
   }
   for (const double x : x_ticks.values()) {
     if (x >= x_low - 1e-9 * x_ticks.step && x <= x_high + 1e-9 * x_ticks.step) {
@@ -188,8 +197,8 @@ inline std::string chart_svg(const LineChart& chart) {
   double legend = left;
   for (std::size_t n = 0; n < chart.lines.size(); ++n) {
     const LineChart::Line line = thinned(chart.lines[n], 1000);
-    const std::string style = std::string(" stroke=\"") + colors[n % colors.size()] + "\"" +
-                              (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
+    const std::string style =
+        std::string(" stroke=\"") + colors[n % colors.size()] + "\"" + (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
     std::string path;
     bool drawing = false;
     for (std::size_t k = 0; k < line.x.size(); ++k) {
@@ -241,8 +250,7 @@ class HtmlReport {
 
   void chart(const LineChart& chart) {
     for (const LineChart::Line& line : chart.lines) {
-      expects(line.x.size() == line.y.size(), "LineChart: numbers of x and y of a line", "equal, y has",
-              line.y.size());
+      expects(line.x.size() == line.y.size(), "LineChart: numbers of x and y of a line", "equal, y has", line.y.size());
     }
     body_ += "<figure><figcaption>" + detail::html_text(chart.title) + "</figcaption>\n" + detail::chart_svg(chart) +
              "</figure>\n";
@@ -265,12 +273,13 @@ class HtmlReport {
       images += (images.empty() ? "\"" : ",\n\"") + detail::base64(frame.png) + "\"";
       times += (times.empty() ? "" : ",") + detail::fixed_text(frame.time, 3);
     }
-    body_ += "<figure><img id=\"film\" alt=\"" + detail::html_text(caption) +
-             "\"><div class=\"bar\"><button id=\"play\" type=\"button\">Play</button><input id=\"scrub\" type=\"range\" "
-             "min=\"0\" max=\"" +
-             std::to_string(frames.size() - 1) +
-             "\" value=\"0\" aria-label=\"frame\"><output id=\"time\"></output></div><figcaption>" +
-             detail::html_text(caption) + "</figcaption></figure>\n";
+    body_ +=
+        "<figure><img id=\"film\" alt=\"" + detail::html_text(caption) +
+        "\"><div class=\"bar\"><button id=\"play\" type=\"button\">Play</button><input id=\"scrub\" type=\"range\" "
+        "min=\"0\" max=\"" +
+        std::to_string(frames.size() - 1) +
+        "\" value=\"0\" aria-label=\"frame\"><output id=\"time\"></output></div><figcaption>" +
+        detail::html_text(caption) + "</figcaption></figure>\n";
     script_ = "<script>\nconst images = [" + images + "];\nconst times = [" + times + "];\n" + film_script();
     script_ += "</script>\n";
   }

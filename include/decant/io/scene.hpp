@@ -86,9 +86,9 @@ struct Inlet {
     double time = 0;  ///< [s]
     double rate = 0;  ///< [m^3/s]
   };
-  Vector3<double> position = Vector3<double>::Zero();    ///< [m]
+  Vector3<double> position = Vector3<double>::Zero();     ///< [m]
   Vector3<double> direction = -Vector3<double>::UnitZ();  ///< unit length
-  double radius = 0;                                     ///< [m]
+  double radius = 0;                                      ///< [m]
   std::vector<Flow> flow;  ///< linear between its rows (at least two), zero before the first and after the last
 };
 using Fluid = std::variant<Box, Fill, Inlet>;
@@ -115,8 +115,8 @@ struct Gauge {
 };
 
 struct Liquid {
-  double density = 998;           ///< [kg/m^3]
-  double viscosity = 0.001;       ///< dynamic [Pa s]
+  double density = 998;             ///< [kg/m^3]
+  double viscosity = 0.001;         ///< dynamic [Pa s]
   double surface_tension = 0.0728;  ///< [N/m]
 };
 /// What the file says; the composition's own defaults elsewhere.
@@ -134,9 +134,9 @@ struct Solver {
 /// their place in `bodies`.
 struct Scene {
   std::string name;
-  double spacing = 0;       ///< [m]
-  double end = 0;           ///< [s]
-  double record_rate = 100;  ///< [Hz]
+  double spacing = 0;                    ///< [m]
+  double end = 0;                        ///< [s]
+  double record_rate = 100;              ///< [Hz]
   Vector3<double> gravity{0, 0, -9.81};  ///< [m/s^2]
   scene::Composition composition = scene::Composition::Default;
   scene::Liquid liquid;
@@ -227,7 +227,9 @@ class SceneReader {
     node.refuse("\"default\", \"state_equation\", \"position_based\" or \"paper\"");
   }
 
-  static double length(const JsonNode& node) { return node.number(1e-6, length_limit, "a number [m] from 1e-6 to 1e4"); }
+  static double length(const JsonNode& node) {
+    return node.number(1e-6, length_limit, "a number [m] from 1e-6 to 1e4");
+  }
 
   void read_liquid(const JsonNode& node) {
     node.expect_keys({"density", "viscosity", "surface_tension"});

@@ -48,8 +48,8 @@ class Gauges {
   }
 
   /// Height of the free surface above (x, y) [m]: the top of the lowest column that stands on something. Nothing where
-  /// no such column is there. @param stands bool(const Vector3<double>& x): is there something solid within 1.5 spacings
-  /// below x, or can liquid not fall from there for another reason?
+  /// no such column is there. @param stands bool(const Vector3<double>& x): is there something solid within 1.5
+  /// spacings below x, or can liquid not fall from there for another reason?
   template <class Stands>
   std::optional<double> level(double x, double y, Stands&& stands) const {
     std::vector<Vector3<double>> column;
@@ -66,8 +66,9 @@ class Gauges {
         ++end;
       }
       if (stands(column[begin])) {
-        return surface_over(x, y, {column.begin() + static_cast<std::ptrdiff_t>(begin),
-                                   column.begin() + static_cast<std::ptrdiff_t>(end)});
+        return surface_over(
+            x, y,
+            {column.begin() + static_cast<std::ptrdiff_t>(begin), column.begin() + static_cast<std::ptrdiff_t>(end)});
       }
       begin = end;
     }

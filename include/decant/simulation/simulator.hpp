@@ -114,9 +114,15 @@ class Simulator {
     return body;
   }
 
-  /// Replaces a body's motion, from now on.
+  /// Replaces a body's motion, from now on. While there is liquid, the new motion has to begin where the body is: a jump
+  /// would leave its liquid behind. (move_body takes a body anywhere, along a path.)
   void set_motion(BodyId body, PoseTrack motion) {
     expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    const Pose now = bodies_[body].motion.at(time_), then = motion.at(time_);
+    const double jump = (then.translation - now.translation).norm() +
+                        now.rotation.angularDistance(then.rotation) * bodies_[body].bounds.diagonal().norm();
+    expects(fluid_.size() == 0 || jump < 1e-3 * settings_.spacing, "Simulator: jump of a body in set_motion [m]",
+            "below a thousandth of the spacing while there is liquid", jump);
     bodies_.set_motion(body, std::move(motion));
   }
 
@@ -383,7 +389,7 @@ class Simulator {
     if (!(longest > 0) || left / longest > settings_.most_sub_steps - taken + 1) {
       return 0;
     }
-    return left / std::ceil(left / longest - 1e-9);
+    return left / std::max(1.0, std::ceil(left / longest - 1e-9));
   }
 
   double largest_speed() noexcept {

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Everything but io/, testing/ and neighbor/kd_tree.hpp.
+
+#include <decant/boundary/body_shape.hpp>
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/cavity.hpp>
+#include <decant/boundary/half_space.hpp>
+#include <decant/boundary/mesh_repair.hpp>
+#include <decant/boundary/mesh_report.hpp>
+#include <decant/boundary/mesh_wall.hpp>
+#include <decant/boundary/rigid_bodies.hpp>
+#include <decant/boundary/sampled_wall.hpp>
+#include <decant/boundary/shapes.hpp>
+#include <decant/boundary/solid_parts.hpp>
+#include <decant/boundary/swept_contact.hpp>
+#include <decant/boundary/triangle_mesh.hpp>
+#include <decant/boundary/wall_function.hpp>
+#include <decant/core/batch.hpp>
+#include <decant/core/domain.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/core/fluid_state.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/core/types.hpp>
+#include <decant/force/gravity.hpp>
+#include <decant/force/surface_tension.hpp>
+#include <decant/force/surface_tension_schenck2017.hpp>
+#include <decant/force/viscosity.hpp>
+#include <decant/force/viscosity_schenck2017.hpp>
+#include <decant/force/viscosity_weiler2018.hpp>
+#include <decant/kernel/cubic_spline.hpp>
+#include <decant/kernel/mueller_viscosity.hpp>
+#include <decant/kernel/poly6.hpp>
+#include <decant/kernel/spiky.hpp>
+#include <decant/kernel/wendland_c2.hpp>
+#include <decant/kernel/wendland_c4.hpp>
+#include <decant/neighbor/brute_force.hpp>
+#include <decant/neighbor/cell_grid.hpp>
+#include <decant/neighbor/neighbor_list.hpp>
+#include <decant/pressure/dfsph.hpp>
+#include <decant/pressure/position_based.hpp>
+#include <decant/pressure/state_equation.hpp>
+#include <decant/pressure/state_equation_schenck2017.hpp>
+#include <decant/simulation/contents.hpp>
+#include <decant/simulation/fill.hpp>
+#include <decant/simulation/gauges.hpp>
+#include <decant/simulation/inlet.hpp>
+#include <decant/simulation/liquid.hpp>
+#include <decant/simulation/parts.hpp>
+#include <decant/simulation/simulator.hpp>
+#include <decant/simulation/step_report.hpp>
+#include <decant/version.hpp>

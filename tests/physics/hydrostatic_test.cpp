@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+// Still water 20 cm deep: p = rho g z, level within half a spacing, at rest for good.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <vector>
+
+#include <decant/neighbor/brute_force.hpp>
+#include <decant/simulation/simulator.hpp>
+
+#include "catch.hpp"
+#include "physics/scene.hpp"
+
+using decant::Index;
+
+namespace {
+
+constexpr double depth = 0.2;  // [m]
+constexpr int width = 6;       // spacings
+
+struct Reading {
+  double pressure_error = 0;     // mean over layers and samples, over rho g depth
+  double lowest_level = 1e9, highest_level = -1e9;
+  double early_energy = 0, late_energy = 0;  // mean of the second quarter of the run and of the last [J]
+  double drift = 0;              // of the centre of mass, between these two quarters [m]
+  double largest_density_error = 0;
+  bool always_converged = true;
+};
+
+double level(const decant::FluidState<float>& fluid, double spacing) {
+  std::vector<double> tops(width * width, 0.0);
+  for (Index i = 0; i < fluid.size(); ++i) {
+    const auto place = [&](int axis) {
+      return static_cast<std::size_t>(std::clamp(static_cast<int>(static_cast<double>(fluid.position(axis, i)) / spacing), 0, width - 1));
+    };
+    double& top = tops[place(0) * width + place(1)];
+    top = std::max(top, static_cast<double>(fluid.position(2, i)));
+  }
+  double total = 0;
+  for (const double top : tops) {
+    total += top;
+  }
+  return total / static_cast<double>(tops.size()) + 0.5 * spacing;
+}
+
+Reading watch_column(double spacing, double seconds) {
+  decant::SimulatorSettings settings;
+  settings.spacing = spacing;
+  settings.threads = {1};
+  decant::LiquidSimulator simulator(settings);
+  const int layers = static_cast<int>(std::lround(depth / spacing));
+  const double side = width * spacing;
+  simulator.add_body("column", decant::BoxInside{{0, 0, 0}, {side, side, 1.5 * depth}, 2 * spacing, {}});
+  const auto places = decant_test::block<float>({0, 0, 0}, width, width, layers, spacing, 0.05);
+  simulator.add_particles(places, decant::PointArray<float>::Zero(3, places.cols()), 0);
+
+  Reading reading;
+  const double frame = 0.02;
+  const int frames = static_cast<int>(std::lround(seconds / frame));
+  std::vector<double> pressure(static_cast<std::size_t>(2 * layers)), height(pressure.size()), count(pressure.size());
+  double early_height = 0, late_height = 0;
+  for (int f = 0; f < frames; ++f) {
+    const auto report = simulator.step(frame);
+    reading.always_converged = reading.always_converged && report.status == decant::StepStatus::ok;
+    reading.largest_density_error = std::max(reading.largest_density_error, report.density_error);
+    const auto& fluid = simulator.fluid();
+    const double center = decant_test::mean_over(fluid, [&](Index i) { return fluid.position(2, i); });
+    const int quarter = 4 * f / frames;
+    if (quarter == 1) {
+      reading.early_energy += 4 * report.kinetic_energy / frames;
+      early_height += 4 * center / frames;
+    }
+    if (quarter == 3) {
+      reading.late_energy += 4 * report.kinetic_energy / frames;
+      late_height += 4 * center / frames;
+    }
+    if (quarter == 0) {
+      continue;
+    }
+    const double surface = level(fluid, spacing);
+    reading.lowest_level = std::min(reading.lowest_level, surface);
+    reading.highest_level = std::max(reading.highest_level, surface);
+    for (Index i = 0; i < fluid.size(); ++i) {
+      const double z = static_cast<double>(fluid.position(2, i));
+      const auto layer = static_cast<std::size_t>(std::clamp(z / spacing, 0.0, 2.0 * layers - 1));
+      pressure[layer] += static_cast<double>(fluid.pressure[i]);
+      height[layer] += z;
+      count[layer] += 1;
+    }
+  }
+  reading.drift = late_height - early_height;
+  double filled = 0;
+  const double weight = settings.liquid.density * 9.81;
+  for (std::size_t k = 0; k < pressure.size(); ++k) {
+    if (count[k] > 0) {
+      const double expected = weight * std::max(depth - height[k] / count[k], 0.0);
+      reading.pressure_error += std::abs(pressure[k] / count[k] - expected);
+      filled += 1;
+    }
+  }
+  reading.pressure_error /= filled * weight * depth;
+  std::printf("column d %.3f t %.0f: perr %.4f level %.4f..%.4f ke %.3g -> %.3g (v %.4f) drift %.5f derr %.2e conv %d\n", spacing, seconds,
+              reading.pressure_error, reading.lowest_level, reading.highest_level, reading.early_energy,
+              reading.late_energy, std::sqrt(2 * reading.late_energy / (998.2 * side * side * depth)), reading.drift,
+              reading.largest_density_error, reading.always_converged);
+  return reading;
+}
+
+void require_at_rest(const Reading& reading, double spacing) {
+  CAPTURE(spacing, reading.lowest_level, reading.highest_level, reading.early_energy, reading.late_energy);
+  CHECK(reading.pressure_error < 0.02);
+  CHECK(reading.lowest_level > depth - 0.5 * spacing);
+  CHECK(reading.highest_level < depth + 0.5 * spacing);
+  CHECK(reading.late_energy <= reading.early_energy);
+  CHECK(reading.largest_density_error <= 1e-3);
+  CHECK(reading.always_converged);
+}
+
+}  // namespace
+
+TEST_CASE("still column at 20 mm") { require_at_rest(watch_column(0.02, 4), 0.02); }
+
+TEST_CASE("still column at 10 mm") { require_at_rest(watch_column(0.01, 4), 0.01); }
+
+TEST_CASE("still column at 5 mm", "[slow]") { require_at_rest(watch_column(0.005, 4), 0.005); }
+
+TEST_CASE("a column does not drift in 10 s", "[slow]") {
+  const Reading reading = watch_column(0.01, 10);
+  require_at_rest(reading, 0.01);
+  CHECK(std::abs(reading.drift) < 0.1 * 0.01);
+}

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: MIT
+// The simulator's own promises: time and reports, particles in and out, motions of bodies, weight on a body's walls.
+
+#include <decant/simulation/simulator.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <decant/boundary/shapes.hpp>
+#include <decant/simulation/fill.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+namespace {
+
+SimulatorSettings with_spacing(double spacing) {
+  SimulatorSettings settings;
+  settings.spacing = spacing;
+  settings.threads = {1};
+  return settings;
+}
+
+template <class Scalar>
+PointArray<Scalar> block(int nx, int ny, int nz, double spacing) {
+  PointArray<Scalar> x(3, nx * ny * nz);
+  Index n = 0;
+  for (int i = 0; i < nx; ++i) {
+    for (int j = 0; j < ny; ++j) {
+      for (int k = 0; k < nz; ++k) {
+        x.col(n++) = (spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
+      }
+    }
+  }
+  return x;
+}
+
+template <class Scalar>
+Simulator<DefaultParts<Scalar>> box_of_liquid() {
+  Simulator<DefaultParts<Scalar>> simulator(with_spacing(0.008));
+  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
+  const auto x = block<Scalar>(6, 6, 5, 0.008);
+  simulator.add_particles(x, PointArray<Scalar>::Zero(3, x.cols()), 3);
+  return simulator;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("simulator: a frame takes its time and reports what there is", "", float, double) {
+  auto simulator = box_of_liquid<TestType>();
+  CHECK(simulator.time() == 0);
+  CHECK(simulator.smoothing_length() == Approx(0.008));
+  for (int k = 1; k <= 10; ++k) {
+    const StepReport report = simulator.step(1.0 / 60);
+    REQUIRE(report.advanced());
+    CHECK(simulator.time() == Approx(k / 60.0).epsilon(1e-12));
+    CHECK(report.sub_steps >= 4);  // at most 5 ms each
+    CHECK(report.sub_steps < 100);
+    CHECK(report.particles == 180);
+    CHECK(report.volume == Approx(180 * std::pow(0.008, 3)).epsilon(1e-5));
+    CHECK(report.density_error < 0.02);
+    CHECK(report.density_iterations > 0);
+    CHECK(report.lost == 0);
+    CHECK(report.non_finite == 0);
+    double energy = 0;
+    for (Index i = 0; i < simulator.fluid().size(); ++i) {
+      energy += 0.5 * static_cast<double>(simulator.fluid().mass[i]) *
+                static_cast<double>(simulator.fluid().velocity.col(i).squaredNorm());
+    }
+    CHECK(report.kinetic_energy == Approx(energy).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("simulator: a status has a name") {
+  CHECK(to_string(StepStatus::ok) == "ok");
+  CHECK(to_string(StepStatus::not_converged) == "not converged");
+  CHECK(to_string(StepStatus::bad_time_step) == "bad time step");
+  CHECK(to_string(StepStatus::too_many_steps) == "too many sub-steps");
+  CHECK(to_string(StepStatus::non_finite) == "non-finite");
+  CHECK(to_string(static_cast<StepStatus>(99)) == "unknown");
+}
+
+TEMPLATE_TEST_CASE("simulator: free fall without bodies is exact to the step", "", float, double) {
+  SimulatorSettings settings = with_spacing(0.01);
+  settings.fixed_step = 0.001;
+  Simulator<DefaultParts<TestType>> simulator(settings);
+  PointArray<TestType> x(3, 1), v(3, 1);
+  x << TestType(0.1), TestType(0.2), TestType(0.3);
+  v << TestType(1), TestType(0), TestType(2);
+  simulator.add_particles(x, v, 0);
+  for (int k = 0; k < 30; ++k) {
+    REQUIRE(simulator.step(0.01).sub_steps == 10);
+  }
+  // symplectic Euler: velocity exact, position ahead by half a step's worth of speed
+  const double t = 0.3, g = 9.81;
+  CHECK(simulator.fluid().velocity(2, 0) == Approx(2 - g * t).epsilon(1e-4));
+  CHECK(simulator.fluid().position(2, 0) == Approx(0.3 + 2 * t - 0.5 * g * t * (t + 0.001)).epsilon(1e-4));
+  CHECK(simulator.fluid().position(0, 0) == Approx(0.4).epsilon(1e-4));
+}
+
+TEMPLATE_TEST_CASE("simulator: ids are unique and stay with their particles", "", float, double) {
+  auto simulator = box_of_liquid<TestType>();
+  auto& fluid = simulator.fluid();
+  // written in place, without a copy
+  for (Index i = 0; i < fluid.size(); ++i) {
+    fluid.origin[i] = 1000 + fluid.id[i];
+  }
+  REQUIRE(simulator.step(0.05).advanced());
+  std::set<std::uint32_t> seen;
+  for (Index i = 0; i < fluid.size(); ++i) {
+    CHECK(fluid.origin[i] == 1000 + fluid.id[i]);
+    seen.insert(fluid.id[i]);
+  }
+  CHECK(seen.size() == 180);
+  // half of them leave; others come and get new numbers
+  const Index removed = simulator.remove_particles_if([&](Index i) { return fluid.id[i] % 2 == 0; });
+  CHECK(removed == 90);
+  CHECK(fluid.size() == 90);
+  for (Index i = 0; i < fluid.size(); ++i) {
+    CHECK(fluid.id[i] % 2 == 1);
+    CHECK(fluid.origin[i] == 1000 + fluid.id[i]);
+  }
+  const PointArray<TestType> more = PointArray<TestType>::Constant(3, 1, TestType(0.03));
+  simulator.add_particles(more, PointArray<TestType>::Zero(3, 1), 5);
+  CHECK(fluid.id[fluid.size() - 1] == 180);
+  CHECK(fluid.mass[fluid.size() - 1] == Approx(998.2 * std::pow(0.008, 3)));
+  for (int k = 0; k < 5; ++k) {
+    REQUIRE(simulator.step(0.02).advanced());
+  }
+  CHECK(fluid.size() == 91);
+}
+
+TEMPLATE_TEST_CASE("simulator: the force on a vessel is the weight in it within one percent", "", float, double) {
+  Simulator<DefaultParts<TestType>> simulator(with_spacing(0.006));
+  const BodyId body = simulator.add_body("glass", CylinderInside{0.03, 0.08, 0.002, Face::PositiveZ});
+  const FillReport filled = fill(simulator, body, FillAmount::level(0.042));
+  const double weight = filled.volume * 998.2 * 9.81;
+  Vector3<double> mean = Vector3<double>::Zero();
+  constexpr int frames = 20;
+  for (int k = 0; k < 20 + frames; ++k) {
+    REQUIRE(simulator.step(0.02).advanced());
+    if (k >= 20) {
+      mean += simulator.pressure_force_on(body) / frames;
+    }
+  }
+  INFO("force [N] " << mean.transpose() << ", weight [N] " << weight);
+  CHECK(std::abs(-mean.z() - weight) < 0.01 * weight);
+  CHECK(mean.head<2>().norm() < 0.01 * weight);
+}
+
+TEST_CASE("simulator: a body moves where it is told to and takes its liquid along") {
+  auto simulator = box_of_liquid<float>();
+  REQUIRE(simulator.step(0.02).advanced());
+  const double start = simulator.time();
+  const Pose there{Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitZ())), {0.05, -0.02, 0.03}};
+  simulator.move_body(0, there, 0.4);
+  // where it was, half-way, there, and it stays
+  CHECK(simulator.bodies()[0].motion.at(start).translation.norm() == Approx(0).margin(1e-12));
+  CHECK(simulator.bodies()[0].motion.at(start + 0.2).translation.isApprox(0.5 * there.translation, 1e-9));
+  for (int k = 0; k < 30; ++k) {
+    REQUIRE(simulator.step(0.02).advanced());
+  }
+  const Pose now = simulator.bodies()[0].motion.at(simulator.time());
+  CHECK(now.translation.isApprox(there.translation, 1e-9));
+  CHECK(now.rotation.angularDistance(there.rotation) < 1e-9);
+  for (Index i = 0; i < simulator.fluid().size(); ++i) {
+    const Vector3<double> x = now.inverse() * Vector3<double>(simulator.fluid().position.col(i).cast<double>());
+    REQUIRE((x.array() > 0).all());
+    REQUIRE((x.head<2>().array() < 0.048).all());
+  }
+  // pose by pose, as from a robot
+  for (int k = 0; k < 20; ++k) {
+    Pose next = now;
+    next.translation.x() += 0.004 * (k + 1);
+    simulator.move_body(0, next, 0.02);
+    REQUIRE(simulator.step(0.02).advanced());
+    CHECK(simulator.bodies()[0].motion.at(simulator.time()).translation.isApprox(next.translation, 1e-9));
+  }
+  CHECK(simulator.fluid().position.row(0).mean() > 0.05f + 0.08f);
+}
+
+TEST_CASE("simulator: settling brings to rest without letting time pass") {
+  LiquidSimulator simulator(with_spacing(0.008));
+  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.064, 0.048, 0.08}, 0.002, Face::PositiveZ},
+                     PoseTrack({{0, Pose{}}, {1, Pose{Eigen::Quaterniond::Identity(), {2, 0, 0}}}}));
+  InletSettings inlet;
+  inlet.position = {0.03, 0.03, 0.1};
+  inlet.flow = {{0, 1e-4}, {1, 1e-4}};
+  simulator.add_inlet(inlet, 1);
+  const auto x = block<float>(3, 6, 6, 0.008);
+  simulator.add_particles(x, PointArray<float>::Zero(3, x.cols()), 0);
+  const StepReport report = simulator.settle();
+  CHECK(report.advanced());
+  CHECK(simulator.time() == 0);
+  CHECK(simulator.fluid().size() == 108);  // the inlet was held as well
+  CHECK(simulator.fluid().velocity.isZero());
+  CHECK(simulator.fluid().position.row(0).maxCoeff() > 0.05f);  // it has spread
+  CHECK(simulator.fluid().position.row(0).maxCoeff() < 0.064f);
+  CHECK(simulator.bodies()[0].motion.end_time() == 1);
+  // and goes on from there
+  REQUIRE(simulator.step(0.2).advanced());
+  CHECK(simulator.fluid().size() > 108);
+}
+
+TEST_CASE("simulator: parts take their settings from the simulator") {
+  SimulatorSettings settings = with_spacing(0.005);
+  settings.gravity = {1, 2, 3};
+  settings.liquid = liquids::olive_oil;
+  settings.numerical_viscosity = 0;
+  Simulator<CapillaryParts<double>> simulator(settings);
+  CHECK(simulator.force<Gravity<double>>().acceleration == Vector3<double>(1, 2, 3));
+  CHECK(simulator.force<Viscosity<double>>().kinematic_viscosity == Approx(0.084 / 911));
+  CHECK(simulator.force<SurfaceTension<double>>().surface_tension == Approx(0.032));
+  settings.numerical_viscosity = 0.02;
+  Simulator<CapillaryParts<double>> calmed(settings);
+  CHECK(calmed.force<Viscosity<double>>().kinematic_viscosity ==
+        Approx(0.084 / 911 + 0.02 * 0.005 * std::sqrt(std::sqrt(14.0) * 0.005)));
+}
+
+TEST_CASE("simulator: a periodic channel keeps its liquid and its mass") {
+  struct Channel : DefaultParts<double> {
+    using Domain = PeriodicDomain<double>;
+    using NeighborSearch = CellGrid<double, Domain>;
+  };
+  SimulatorSettings settings = with_spacing(0.01);
+  settings.gravity = {2, 0, -9.81};
+  Simulator<Channel> simulator(settings, PeriodicDomain<double>({0.08, 0.08, 0}));
+  simulator.add_body("floor", Box{{-1, -1, -0.05}, {1, 1, 0}});
+  const auto x = block<double>(8, 8, 5, 0.01);
+  simulator.add_particles(x, PointArray<double>::Zero(3, x.cols()), 0);
+  for (int k = 0; k < 20; ++k) {
+    REQUIRE(simulator.step(0.01).advanced());
+  }
+  const auto& fluid = simulator.fluid();
+  CHECK(fluid.size() == 320);
+  CHECK((fluid.position.topRows(2).array() >= 0).all());
+  CHECK((fluid.position.topRows(2).array() < 0.08).all());
+  CHECK((fluid.position.row(2).array() > 0).all());
+  // a free floor: all of it speeds up alike
+  CHECK(fluid.velocity.row(0).mean() == Approx(2 * 0.2).epsilon(0.01));
+}
