@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <string>
 #include <utility>
@@ -65,7 +64,7 @@ TEST_CASE("dam break front follows Martin and Moyce", "[slow]") {
     simulated.emplace_back(simulator.time() / unit, gauges.front().value() / a);
   }
   // the zero of T is uncertain: one free shift of up to 0.3
-  double best_mean = 1e9, best_worst = 1e9, best_shift = 0;
+  double best_mean = 1e9, best_worst = 1e9;
   for (double shift = -0.3; shift <= 0.3001; shift += 0.02) {
     double mean = 0, worst = 0;
     for (const auto& [t, z] : measured) {
@@ -76,11 +75,8 @@ TEST_CASE("dam break front follows Martin and Moyce", "[slow]") {
     if (mean < best_mean) {
       best_mean = mean;
       best_worst = worst;
-      best_shift = shift;
     }
   }
-  for (const auto& [t, z] : measured) std::printf("  T %.2f Z %.2f sim %.2f\n", t, z, at(simulated, t + best_shift));
-  std::printf("dam break: mean %.3f worst %.3f shift %.2f\n", best_mean, best_worst, best_shift);
   CHECK(best_mean < 0.05);
   CHECK(best_worst < 0.12);
 }

@@ -109,14 +109,14 @@ TEMPLATE_TEST_CASE("PositionBased pushes off a wall that comes near", "", float,
   solver.density_tolerance = TestType(1e-6);  // of the mean over all, and here it is about one particle
   Index lowest = 0;
   liquid.fluid.position.row(2).minCoeff(&lowest);
-  liquid.walls.gradient(2, lowest) = -80;
+  liquid.walls.gradient(2, lowest) = -160;
   // a wall that fills just what the liquid leaves
   const double own = static_cast<double>(liquid.fluid.density[lowest]) / 1000;
   liquid.walls.share[lowest] = static_cast<TestType>(1 - own);
   solve(solver, liquid);
   const TestType still = liquid.fluid.velocity(2, lowest);
   liquid.fluid.velocity.setZero();
-  liquid.walls.flux[lowest] = -80 * TestType(0.5);  // moves up at 0.5 m/s
+  liquid.walls.flux[lowest] = -160 * TestType(0.5);  // moves up at 0.5 m/s
   solver.most_iterations = 100;
   solve(solver, liquid);
   CHECK(liquid.fluid.velocity(2, lowest) > still + TestType(0.05));

@@ -72,17 +72,13 @@ class MeshWall {
       return sample_directly(x, result);  // the surface passes through this cell: its corners see different sides
     }
     Eigen::Matrix<double, 5, 1> mean = Eigen::Matrix<double, 5, 1>::Zero();
-    double correction = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
       const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
-      const Eigen::Matrix<double, 5, 1> node = nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
-      mean += weight * node;
-      // half a step along each corner's gradient makes the mean exact for quadratic fields
-      correction += weight * node.segment<3>(1).dot(t - Vector3<double>(di, dj, dk));
+      mean += weight * nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
     }
-    result.share = std::max(mean[0] + 0.5 * cell_ * correction, 0.0);
-    result.gradient = mean.segment<3>(1);
+    result.share = plane_.share(mean[0]);
+    result.gradient = plane_.slope(mean[0]) * mean.segment<3>(1);
     result.distance = mean[4];
     return result.share > 0;
   }
@@ -118,6 +114,9 @@ class MeshWall {
   static constexpr int block_nodes = block_cells + 1;
 
   /// Eight cells a side; border nodes are stored in both blocks, so that a look-up stays within one.
+  /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, and the
+  /// true distance. Near a plane all of these are linear or constant in space, so interpolation is exact there, although
+  /// the share itself is steep.
   struct Block {
     std::array<Eigen::Matrix<float, 5, 1>, block_nodes * block_nodes * block_nodes> value;
     std::bitset<block_cells * block_cells * block_cells> crossed;
@@ -191,17 +190,31 @@ class MeshWall {
 
   double spacing_of_cell() const noexcept { return cell_ * cells_per_spacing; }
 
+  Eigen::Matrix<float, 5, 1> node_at(const Vector3<double>& x) const noexcept {
+    Eigen::Matrix<double, 5, 1> node = Eigen::Matrix<double, 5, 1>::Zero();
+    node[0] = node[4] = 2 * reach();
+    WallSample sample;
+    const bool near = sample_directly(x, sample);
+    const double distance = near ? plane_.distance_for(sample.share) : 0;
+    // close to the reach share and slope tend to zero, and their quotients to rounding: the nearest point tells better
+    if (near && distance < 0.9 * reach()) {
+      node[0] = distance;
+      node.segment<3>(1) = sample.gradient / plane_.slope(distance);
+      node[4] = sample.distance;
+    } else if (const auto nearest = surface_->closest_point(x, 2 * reach())) {
+      node[0] = node[4] = nearest->distance;
+      if (nearest->distance > 0) {
+        node.segment<3>(1) = (nearest->point - x) / nearest->distance;
+      }
+    }
+    return node.cast<float>();
+  }
+
   void fill(Block& block, const Vector3<double>& corner) const noexcept {
     for (int k = 0; k < block_nodes; ++k) {
       for (int j = 0; j < block_nodes; ++j) {
         for (int i = 0; i < block_nodes; ++i) {
-          WallSample sample;
-          sample.distance = reach();
-          sample_directly(corner + cell_ * Vector3<double>(i, j, k), sample);
-          auto& node = block.value[node_number(i, j, k)];
-          node[0] = static_cast<float>(sample.share);
-          node.segment<3>(1) = sample.gradient.cast<float>();
-          node[4] = static_cast<float>(sample.distance);
+          block.value[node_number(i, j, k)] = node_at(corner + cell_ * Vector3<double>(i, j, k));
         }
       }
     }

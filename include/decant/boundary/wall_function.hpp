@@ -71,6 +71,13 @@ class WallFunction {
     return amplitude_ * power_ / reach_ * std::pow(left(std::abs(a)), power_ - 1);
   }
 
+  /// The distance at which a plane adds `share`, the inverse of share(a); -R .. R [m].
+  double distance_for(double share) const noexcept {
+    const double front = share > amplitude_ ? std::max(2 * amplitude_ - share, 0.0) : std::max(share, 0.0);
+    const double a = reach_ * (1 - std::pow(front / amplitude_, 1 / power_));
+    return share > amplitude_ ? -a : a;
+  }
+
   /// r w(r) = share''(r) / (2 pi) [1/m^2]; w itself is singular at r = 0, its integrals are not.
   double radius_times_weight(double r) const noexcept {
     return amplitude_ * power_ * (power_ - 1) / (reach_ * reach_) * std::pow(left(r), power_ - 2) / (2 * pi);

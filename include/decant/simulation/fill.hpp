@@ -163,7 +163,8 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   auto count = static_cast<Index>(std::llround(volume / particle_volume));
   const auto most = static_cast<Index>(std::llround(report.capacity / particle_volume));
   const auto place = [&](Index n) {
-    const double level = cavity.height_of(static_cast<double>(n) * particle_volume) - cavity.bottom_height();
+    const double level =
+        cavity.height_of(std::min(static_cast<double>(n) * particle_volume, report.capacity)) - cavity.bottom_height();
     const PointArray<double> in_body = detail::places_in(cavity, *container.surface, up, level, n, spacing);
     expects(in_body.cols() == n, name + "number of particles", "few enough to fit into it at this spacing", n);
     PointArray<Scalar> position(3, n);

@@ -94,7 +94,7 @@ class Simulator {
 
   /// Throws std::invalid_argument if a setting is out of range.
   explicit Simulator(const SimulatorSettings& settings = {}, const Domain& domain = {})
-      : settings_(settings), domain_(domain), search_(domain) {
+      : settings_(settings), domain_(domain), search_(domain), neighbors_(domain) {
     validate(settings_);
     smoothing_length_ =
         settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
@@ -467,7 +467,7 @@ class Simulator {
   /// Cheap first questions, of which a pair that a wall separates passes both: the two are farther apart than both
   /// walls are near, and one of them is behind the plane that touches the wall nearest to the other.
   bool behind(Index i, Index j) const noexcept {
-    if (walls_.contact_count[i] == 0 || walls_.contact_count[j] == 0) {
+    if (walls_.contact_count[i] == 0 && walls_.contact_count[j] == 0) {
       return false;
     }
     const Vector3<Scalar> apart = fluid_.position.col(j) - fluid_.position.col(i);
@@ -592,7 +592,7 @@ class Simulator {
   std::vector<InletWithOrigin> inlets_{};
 
   FluidState<Scalar> fluid_{};
-  Neighbors neighbors_{};
+  Neighbors neighbors_;
   WallState<Scalar> walls_{};
   double time_ = 0;
   double last_step_ = 0;
