@@ -16,6 +16,6 @@ mkdir -p "$results"
 motion=TRD_2D_0.3m_2.4s_270deg
 if (($# == 0)); then
   set -- --poses "examples/data/pose_$motion.csv" --heights "examples/data/height_$motion.csv" \
-    --radius-mm 49 --depth-mm 78 --json "$results/result.json" --report "$results/report.html" --vtk "$results/vtk"
+    --radius-mm 49 --depth-mm 78 --spacing-mm 5 --json "$results/result.json" --report "$results/report.html" --vtk "$results/vtk"
 fi
 build/examples/replay_motion "$@"
