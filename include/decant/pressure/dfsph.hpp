@@ -130,7 +130,7 @@ class Dfsph {
   static constexpr Scalar largest_shift = Scalar(0.2);        ///< spacings, per sub-step
   static constexpr Scalar closing_time = Scalar(0.05);                           ///< [s]
   /// Jacobi steps with momentum converge while relaxation times the largest eigenvalue of the scaled system stays below
-  /// one. That eigenvalue was found to be near 2.5 in disordered liquid: 0.3 converges, 0.5 diverges after 20 iterations.
+  /// one. The eigenvalue itself was not measured; in a collapsing column 0.3 converged, 0.5 diverged after 20 iterations.
   static constexpr Scalar relaxation = Scalar(0.3);
 
   struct Outcome {

@@ -30,7 +30,7 @@ inline void validate(const Liquid& liquid) {
           ">= 0 and < 100", liquid.surface_tension);
 }
 
-/// Real liquids at 20 degrees Celsius. Honey varies by a factor of ten with its water content; milk with its fat.
+/// Real liquids at 20 degrees Celsius; values as commonly tabulated, with the works that treat them. Honey varies by a factor of ten with its water content; milk with its fat.
 namespace liquids {
 
 /// IAPWS formulations (density, viscosity R12-08, surface tension R1-76).
