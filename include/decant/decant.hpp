@@ -24,7 +24,9 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
+#include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
+#include <decant/force/residual_viscosity.hpp>
 #include <decant/force/surface_tension.hpp>
 #include <decant/force/surface_tension_schenck2017.hpp>
 #include <decant/force/viscosity.hpp>

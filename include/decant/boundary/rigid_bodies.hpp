@@ -121,21 +121,33 @@ class RigidBodies {
     }
   }
 
-  /// Largest speed of any point that the bodies' surfaces have over [time, time + time_step] [m/s].
-  double largest_speed(double time, double time_step) const noexcept {
-    double largest = 0;
-    for (const Body& body : bodies_) {
-      if (body.motion.samples().size() < 2) {
-        continue;
-      }
-      const Pose before = body.motion.at(time);
-      const RigidVelocity velocity = velocity_between(before, body.motion.at(time + time_step), time_step);
-      for (int corner = 0; corner < 8; ++corner) {
-        const Vector3<double> x = body.bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
-        largest = std::max(largest, velocity.at(before * x).norm());
-      }
-    }
-    return largest;
+  /// Largest speed of any particle relative to any body, at the body's point that is nearest to the particle within its
+  /// bounds, over the current interval; relative to the world if nothing moves or there is no body [m/s]. NaN if any
+  /// velocity is.
+  double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads, Reduction<double>& reduction) const {
+    const bool all_move = !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), moves);
+    return reduction.over(
+        fluid.size(), threads, 0.0,
+        [&](Index begin, Index end) {
+          double largest = 0;
+          const auto take = [&largest](double speed) { largest = speed <= largest ? largest : speed; };  // NaN stays
+          for (Index i = begin; i < end; ++i) {
+            const Vector3<double> x = fluid.position.col(i).template cast<double>();
+            const Vector3<double> v = fluid.velocity.col(i).template cast<double>();
+            if (!all_move) {
+              take(v.norm());
+            }
+            for (const Body& body : bodies_) {
+              if (moves(body)) {
+                const Vector3<double> x_in_body = body.from_world_before * x;
+                const Vector3<double> nearest = x_in_body.cwiseMax(body.bounds.min()).cwiseMin(body.bounds.max());
+                take((v - body.velocity.at(body.before * nearest)).norm());
+              }
+            }
+          }
+          return largest;
+        },
+        [](double a, double b) { return b <= a ? a : b; });
   }
 
   /// Fills `walls` for particles at `position` 3xN [m], with the bodies as they stand at the start of the interval.
@@ -212,6 +224,8 @@ class RigidBodies {
     Vector3<double> point = Vector3<double>::Zero();
   };
 
+  static bool moves(const Body& body) noexcept { return body.motion.samples().size() > 1; }
+
   static Eigen::Isometry3d isometry(const Pose& pose) noexcept {
     Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
     result.linear() = pose.rotation.toRotationMatrix();
@@ -280,6 +294,7 @@ class RigidBodies {
       contact.body = near[k].body;
       contact.gradient = share.template cast<Scalar>();
       contact.velocity = velocity.template cast<Scalar>();
+      contact.distance = static_cast<Scalar>(near[k].distance);
       // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own layer
       // and the quotient would only measure rounding.
       const double distance = std::max(near[k].distance, 0.25 * spacing);

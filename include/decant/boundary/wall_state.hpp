@@ -16,6 +16,7 @@ namespace decant {
 template <class Scalar>
 struct WallContact {
   std::uint32_t body = 0;
+  Scalar distance = 0;                                   ///< of the particle to the wall [m]
   Scalar friction = 0;                                   ///< viscous rate per kinematic viscosity [1/m^2]; 0 for free slip
   Vector3<Scalar> gradient = Vector3<Scalar>::Zero();    ///< [1/m]
   Vector3<Scalar> velocity = Vector3<Scalar>::Zero();    ///< of the wall at the closest point [m/s]

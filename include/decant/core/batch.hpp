@@ -465,11 +465,11 @@ struct Batch4 {
 template <std::floating_point Scalar>
 [[gnu::always_inline]] inline Batch4<Scalar> gather4(const Scalar* records4, const std::uint32_t* index) noexcept {
   using B = Batch<Scalar>;
-  const auto record = [&](int k) { return records4 + 4 * static_cast<std::size_t>(index[k]); };
+  const auto record = [&](int k) __attribute__((always_inline)) { return records4 + 4 * static_cast<std::size_t>(index[k]); };
 #if defined(__AVX512F__) && defined(__AVX512VL__) && defined(__AVX512DQ__)
   if constexpr (B::width == 16) {
     // Rows hold the records k, k+4, k+8, k+12; turning each 4x4 quarter then leaves the lanes in their natural order.
-    const auto row = [&](int k) {
+    const auto row = [&](int k) __attribute__((always_inline)) {
       __m512 r = _mm512_maskz_broadcast_f32x4(0xffff, _mm_loadu_ps(record(k)));
       r = _mm512_mask_broadcast_f32x4(r, 0x00f0, _mm_loadu_ps(record(k + 4)));
       r = _mm512_mask_broadcast_f32x4(r, 0x0f00, _mm_loadu_ps(record(k + 8)));
@@ -485,7 +485,7 @@ template <std::floating_point Scalar>
             B(_mm512_castpd_ps(_mm512_maskz_unpacklo_pd(0xff, zw01, zw23))),
             B(_mm512_castpd_ps(_mm512_maskz_unpackhi_pd(0xff, zw01, zw23)))};
   } else if constexpr (sizeof(typename B::Vector) == 64) {
-    const auto row = [&](int k) {
+    const auto row = [&](int k) __attribute__((always_inline)) {
       const __m512d lower = _mm512_maskz_broadcast_f64x4(0xff, _mm256_loadu_pd(record(k)));
       return _mm512_mask_broadcast_f64x4(lower, 0xf0, _mm256_loadu_pd(record(k + 4)));
     };
@@ -500,7 +500,7 @@ template <std::floating_point Scalar>
 #endif
 #if defined(__AVX2__)
   if constexpr (B::width == 8 && sizeof(Scalar) == 4) {
-    const auto row = [&](int k) {
+    const auto row = [&](int k) __attribute__((always_inline)) {
       return _mm256_insertf128_ps(_mm256_castps128_ps256(_mm_loadu_ps(record(k))), _mm_loadu_ps(record(k + 4)), 1);
     };
     const __m256 r0 = row(0), r1 = row(1), r2 = row(2), r3 = row(3);

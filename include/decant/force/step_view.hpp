@@ -7,6 +7,7 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
+#include <decant/force/gradient_correction.hpp>
 
 namespace decant {
 
@@ -21,6 +22,7 @@ struct StepView {
   FluidState<Scalar>& fluid;
   const Neighbors& neighbors;         ///< pairs within the support radius, without those that a wall separates
   const WallState<Scalar>& walls;
+  const GradientCorrection<Scalar>& correction;  ///< empty unless a part has `uses_gradient_correction = true`
   Growable<Scalar, 3>& shift;         ///< 3xN, moved at the end of the sub-step beside time_step * velocity [m]; zero at
                                       ///< its start. For pressure solvers that correct places without adding speed.
   Scalar smoothing_length = 0;        ///< h [m]

@@ -127,8 +127,10 @@ class Gauges {
 
   /// Highest point of the liquid along a body's own z axis, in the body's frame [m]; of the liquid within the body's
   /// `bounds` across that axis, the largest piece counts. Nothing where there is none.
-  /// Each particle at the surface gets a plane fitted to the surface around it, which evens out its noise, and
-  /// counts to where that plane leaves the particle's own cube: the liquid climbs on from its centre to the wall.
+  /// Liquid is measured by volume, as the highest particle would be too high by what particles stray: above a slab in
+  /// which liquid is everywhere, a column of a few spacings across holds as much more as its surface is higher. A surface
+  /// that leans goes on to where the liquid ends. Crests narrower than the column are flattened; liquid less than seven
+  /// spacings deep counts by its highest particle.
   std::optional<double> top(const Pose& world_from_body, const Eigen::AlignedBox3d& bounds) {
     find_pieces();
     const Pose body_from_world = world_from_body.inverse();
@@ -143,64 +145,58 @@ class Gauges {
       place(i) = body_from_world * position(i);
     }
     const std::uint32_t bulk = largest_piece(within);
-    const auto belongs = [&](Index i) { return piece_[static_cast<std::size_t>(i)] == bulk && within(i); };
+    bulk_.clear();
     double highest = -std::numeric_limits<double>::infinity();
     for (Index i = 0; i < count(); ++i) {
-      highest = belongs(i) ? std::max(highest, place(i).z()) : highest;
+      if (piece_[static_cast<std::size_t>(i)] == bulk && within(i)) {
+        bulk_.push_back(place(i));
+        highest = std::max(highest, place(i).z());
+      }
     }
-    if (!std::isfinite(highest)) {
+    if (bulk_.empty()) {
       return std::nullopt;
     }
-    // planes fitted to noise differ from the particles by less than this
-    const double lowest = highest - 3 * spacing_;
-    surface_.clear();
-    for (Index i = 0; i < count(); ++i) {
-      if (belongs(i) && place(i).z() > lowest - fit_reach * spacing_) {
-        bool covered = false;
-        grid_.for_each(i, [&](Index j, Scalar) { covered = covered || covers(place(j) - place(i)); });
-        if (!covered) {
-          surface_.push_back(place(i));
-        }
+    // across the axis only: columns are found as neighbours on a plane
+    flat_.resize(3, static_cast<Index>(bulk_.size()));
+    for (std::size_t k = 0; k < bulk_.size(); ++k) {
+      flat_.col(static_cast<Index>(k)) = Vector3<double>(bulk_[k].x(), bulk_[k].y(), 0);
+    }
+    flat_grid_.rebuild(flat_, column_radius * spacing_);
+    columns_.clear();
+    for (Index i = 0; i < flat_.cols(); ++i) {
+      // a column's surface is at most some spacings below its highest particle
+      if (bulk_[static_cast<std::size_t>(i)].z() > highest - 4 * spacing_) {
+        columns_.push_back(column_at(i));
       }
     }
-    const Eigen::Map<const PointArray<double>> points(surface_.empty() ? nullptr : surface_.front().data(), 3,
-                                                      static_cast<Index>(surface_.size()));
-    surface_grid_.rebuild(points, fit_reach * spacing_);
-    const auto weight_of = [](const Vector3<double>& apart) {
-      return std::max(0.0, 1 - apart.squaredNorm() / (fit_reach * fit_reach));
-    };
-    // twice: planes fitted to particles, then the planes around each particle blended
-    plane_.resize(surface_.size());
-    for (Index i = 0; i < points.cols(); ++i) {
-      Plane plane;
-      plane.add({0, 0, 0}, 1);
-      surface_grid_.for_each(i, [&](Index j, double) {
-        const Vector3<double> apart = (points.col(j) - points.col(i)) / spacing_;
-        plane.add(apart, weight_of(apart));
-      });
-      plane_[static_cast<std::size_t>(i)] = plane.solve();
+    centers_.resize(3, static_cast<Index>(columns_.size()));
+    for (std::size_t k = 0; k < columns_.size(); ++k) {
+      centers_.col(static_cast<Index>(k)) = Vector3<double>(columns_[k].center.x(), columns_[k].center.y(), 0);
     }
+    flat_grid_.rebuild(centers_, slope_reach * spacing_);
     double best = -std::numeric_limits<double>::infinity();
-    for (Index i = 0; i < points.cols(); ++i) {
-      if (points(2, i) <= lowest) {
-        continue;
-      }
-      Vector3<double> sum = plane_[static_cast<std::size_t>(i)];
-      double weights = 1;
-      surface_grid_.for_each(i, [&](Index j, double) {
-        const Vector3<double> apart = (points.col(j) - points.col(i)) / spacing_;
-        const Vector3<double>& plane = plane_[static_cast<std::size_t>(j)];
-        const double weight = weight_of(apart);
-        sum[0] += weight * (apart.z() + plane[0] - plane[1] * apart.x() - plane[2] * apart.y());
-        sum.template tail<2>() += weight * plane.template tail<2>();
-        weights += weight;
+    for (Index k = 0; k < centers_.cols(); ++k) {
+      const Column& column = columns_[static_cast<std::size_t>(k)];
+      Plane plane;
+      const auto add = [&](const Column& other, double distance_squared) {
+        const Vector3<double> apart((other.center.x() - column.center.x()) / spacing_,
+                                    (other.center.y() - column.center.y()) / spacing_,
+                                    (other.height - column.height) / spacing_);
+        plane.add(apart, 1 - distance_squared / (slope_reach * slope_reach * spacing_ * spacing_));
+      };
+      add(column, 0);
+      flat_grid_.for_each(k, [&](Index j, double distance_squared) {
+        add(columns_[static_cast<std::size_t>(j)], distance_squared);
       });
-      const Vector3<double> blend = sum / weights;
+      const Eigen::Vector3d fit = plane.solve();
+      const Eigen::Vector2d slope = fit.tail<2>();
+      const double steepness = slope.norm();
       // a plane steeper than 45 degrees is no surface that a plane describes
-      const double climb = 0.5 * std::min(1.0, blend.template tail<2>().norm());
-      best = std::max(best, points(2, i) + spacing_ * (blend[0] + climb + 0.5));
+      const Eigen::Vector2d lean = steepness > 1 ? Eigen::Vector2d(slope / steepness) : slope;
+      const Eigen::Vector2d outward = column.place - column.center;
+      best = std::max(best, column.height + spacing_ * fit[0] + lean.dot(outward) + 0.5 * spacing_ * lean.norm());
     }
-    return std::isfinite(best) ? std::optional<double>(best) : highest + 0.5 * spacing_;
+    return best;
   }
 
  private:
@@ -223,9 +219,53 @@ class Gauges {
     }
   };
 
-  // Planes are fitted over so many spacings: wide enough to even out the places of single particles; crests narrower
-  // than this are flattened.
-  static constexpr double fit_reach = 3;
+  // The liquid over one place of a plane.
+  struct Column {
+    Eigen::Vector2d place, center;  // where it was looked for, and the middle of what was found
+    double height = 0;
+  };
+
+  // In spacings: wide and deep enough that counting particles measures a surface to a tenth of a spacing.
+  static constexpr double column_radius = 2.5, slab_depth = 8, slab_below_top = 5, slope_reach = 3;
+
+  Column column_at(Index i) const {
+    const Vector3<double>& own = bulk_[static_cast<std::size_t>(i)];
+    double high = own.z(), low = own.z();
+    flat_grid_.for_each(i, [&](Index j, double) {
+      high = std::max(high, bulk_[static_cast<std::size_t>(j)].z());
+      low = std::min(low, bulk_[static_cast<std::size_t>(j)].z());
+    });
+    Column column;
+    column.place = own.template head<2>();
+    column.center = column.place;
+    column.height = high + 0.5 * spacing_;
+    const double slab_top = high - slab_below_top * spacing_;
+    // off the floor, where the lowest particle says little about how far liquid reaches
+    const double slab_bottom = std::max(low + 0.5 * spacing_, slab_top - slab_depth * spacing_);
+    if (slab_top - slab_bottom < 2 * spacing_) {
+      return column;
+    }
+    double above = 0, in_slab = 0;
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    const auto add = [&](const Vector3<double>& x, double distance_squared) {
+      const double weight = std::pow(1 - distance_squared / (column_radius * column_radius * spacing_ * spacing_), 2);
+      // a particle on the border between slab and rest belongs to both by halves
+      const double over = std::clamp((x.z() - slab_top) / spacing_ + 0.5, 0.0, 1.0);
+      const double under = std::clamp((slab_bottom - x.z()) / spacing_ + 0.5, 0.0, 1.0);
+      above += weight * over;
+      in_slab += weight * (1 - over - under);
+      sum += weight * (1 - under) * x.template head<2>();
+    };
+    add(own, 0);
+    flat_grid_.for_each(i, [&](Index j, double distance_squared) {
+      add(bulk_[static_cast<std::size_t>(j)], distance_squared);
+    });
+    if (in_slab > 0) {
+      column.center = sum / (above + in_slab);
+      column.height = slab_top + above / in_slab * (slab_top - slab_bottom);
+    }
+    return column;
+  }
 
   double reach() const { return 2 * spacing_; }
   Index count() const { return fluid_ == nullptr ? 0 : fluid_->size(); }
@@ -308,8 +348,10 @@ class Gauges {
   CellGrid<Scalar> grid_{};
   bool pieces_known_ = false;
   std::vector<std::uint32_t> piece_, size_;
-  std::vector<Vector3<double>> in_body_, surface_, plane_;
-  CellGrid<double> surface_grid_{};
+  std::vector<Vector3<double>> in_body_, bulk_;
+  std::vector<Column> columns_;
+  PointArray<double> flat_, centers_;
+  CellGrid<double> flat_grid_{};
 };
 
 }  // namespace decant

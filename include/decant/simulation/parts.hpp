@@ -9,6 +9,7 @@
 #include <decant/boundary/rigid_bodies.hpp>
 #include <decant/core/domain.hpp>
 #include <decant/force/gravity.hpp>
+#include <decant/force/residual_viscosity.hpp>
 #include <decant/force/surface_tension.hpp>
 #include <decant/force/surface_tension_schenck2017.hpp>
 #include <decant/force/viscosity.hpp>
@@ -32,7 +33,7 @@ struct DefaultParts {
   using Domain = OpenDomain;
   using Kernel = CubicSpline<Scalar>;
   using NeighborSearch = CellGrid<Scalar, Domain>;
-  using Forces = std::tuple<Gravity<Scalar>, Viscosity<Scalar>>;
+  using Forces = std::tuple<Gravity<Scalar>, Viscosity<Scalar>, ResidualViscosity<Scalar>>;
   using PressureSolver = Dfsph<Scalar>;
   using Boundary = RigidBodies<Scalar>;
 };
@@ -40,13 +41,14 @@ struct DefaultParts {
 /// With surface tension, for drops and thin jets.
 template <class ScalarType = float>
 struct CapillaryParts : DefaultParts<ScalarType> {
-  using Forces = std::tuple<Gravity<ScalarType>, Viscosity<ScalarType>, SurfaceTension<ScalarType>>;
+  using Forces = 
+      std::tuple<Gravity<ScalarType>, Viscosity<ScalarType>, ResidualViscosity<ScalarType>, SurfaceTension<ScalarType>>;
 };
 
 /// For thick liquids (kinematic viscosity above about 1e-2 m^2/s): implicit viscosity.
 template <class ScalarType = float>
 struct ThickLiquidParts : DefaultParts<ScalarType> {
-  using Forces = std::tuple<Gravity<ScalarType>, ViscosityWeiler2018<ScalarType>>;
+  using Forces = std::tuple<Gravity<ScalarType>, ViscosityWeiler2018<ScalarType>, ResidualViscosity<ScalarType>>;
 };
 
 /// Weakly compressible: explicit steps limited by the speed of sound, cheap ones.

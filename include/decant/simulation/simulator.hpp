@@ -37,12 +37,12 @@ struct SimulatorSettings {
   Vector3<double> gravity{0, 0, -9.81};             ///< [m/s^2], world frame
   double support_in_spacings = 2;                   ///< support radius over d, 1.5 .. 4
   double largest_step = 0.005;                      ///< longest sub-step [s], > 0
-  double courant_number = 0.4;                      ///< how many spacings anything may move per sub-step, 0 < .. <= 1
+  double courant_number = 0.4;                      ///< how many spacings liquid may move past a body per sub-step,
+                                                    ///< 0 < .. <= 1
   double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
   int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
-  double numerical_viscosity = 0.02;                ///< added to the liquid's, in units of d sqrt(g d): 2e-5 m^2/s at
-                                                    ///< 5 mm. Calms motion from particle to particle; vanishes as the
-                                                    ///< spacing does. >= 0
+  double numerical_viscosity = 0.3;                 ///< of ResidualViscosity, in units of d sqrt(g d): calms motion from
+                                                    ///< particle to particle and leaves the liquid's alone; >= 0
   Threads threads{};                                ///< 0: all
 };
 
@@ -275,7 +275,11 @@ class Simulator {
                           static_cast<double>(fluid_.pressure[i]) / (density * density);
       for (int k = 0; k < walls_.contact_count[i]; ++k) {
         if (contacts[k].body == body) {
-          total += push * contacts[k].gradient.template cast<double>();
+          Vector3<Scalar> gradient = contacts[k].gradient;
+          if constexpr (wants_correction<Solver>) {
+            gradient = correction_.apply(i, gradient);
+          }
+          total += push * gradient.template cast<double>();
         }
       }
     }
@@ -313,6 +317,13 @@ class Simulator {
  private:
   using InletWithOrigin = std::pair<Inlet, Origin>;
 
+  template <class Part>
+  static constexpr bool wants_correction = requires { requires Part::uses_gradient_correction; };
+  static constexpr bool corrects_gradients =
+      wants_correction<Solver> || []<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
+        return (wants_correction<Terms> || ...);
+      }(std::type_identity<Forces>{});
+
   /// Parts that know gravity, viscosity or surface tension by these names take them from the settings.
   void configure_forces() {
     std::apply([this](auto&... terms) { (this->configure(terms), ...); }, forces_);
@@ -323,9 +334,11 @@ class Simulator {
       term.acceleration = settings_.gravity.template cast<Scalar>();
     }
     if constexpr (requires { term.kinematic_viscosity = Scalar(0); }) {
-      term.kinematic_viscosity = static_cast<Scalar>(
-          settings_.liquid.kinematic_viscosity() +
-          settings_.numerical_viscosity * settings_.spacing * std::sqrt(settings_.gravity.norm() * settings_.spacing));
+      term.kinematic_viscosity = static_cast<Scalar>(settings_.liquid.kinematic_viscosity());
+    }
+    if constexpr (requires { term.numerical_viscosity = Scalar(0); }) {
+      term.numerical_viscosity = static_cast<Scalar>(settings_.numerical_viscosity * settings_.spacing *
+                                                     std::sqrt(settings_.gravity.norm() * settings_.spacing));
     }
     if constexpr (requires { term.surface_tension = Scalar(0); }) {
       term.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
@@ -354,6 +367,7 @@ class Simulator {
     return {fluid_,
             neighbors_,
             walls_,
+            correction_,
             shift_,
             static_cast<Scalar>(smoothing_length_),
             static_cast<Scalar>(settings_.spacing),
@@ -370,9 +384,8 @@ class Simulator {
       return left < settings_.fixed_step * (1 + 1e-9) ? left : settings_.fixed_step;
     }
     double longest = settings_.largest_step;
-    const double fluid_speed = largest_speed();
-    const double body_speed = bodies_.largest_speed(time_, std::min(left, longest));
-    const double speed = std::max(fluid_speed, body_speed);
+    bodies_.set_interval(time_, std::min(left, longest));
+    const double speed = bodies_.largest_relative_speed(fluid_, settings_.threads, reduction_);
     if (!std::isfinite(speed)) {
       return 0;
     }
@@ -392,20 +405,6 @@ class Simulator {
     return left / std::max(1.0, std::ceil(left / longest - 1e-9));
   }
 
-  double largest_speed() noexcept {
-    return std::sqrt(reduction_.over(
-        fluid_.size(), settings_.threads, 0.0,
-        [&](Index begin, Index end) {
-          double largest = 0;
-          for (Index i = begin; i < end; ++i) {
-            const double squared = static_cast<double>(fluid_.velocity.col(i).squaredNorm());
-            largest = squared <= largest ? largest : squared;  // a NaN takes over and stays
-          }
-          return largest;
-        },
-        [](double a, double b) { return b <= a ? a : b; }));
-  }
-
   /// @return whether the pressure solver converged.
   bool sub_step(double time_step, StepReport& report) noexcept {
     last_step_ = time_step;
@@ -415,6 +414,9 @@ class Simulator {
     compute_densities();
 
     const Step step = view(time_step);
+    if constexpr (corrects_gradients) {
+      correction_.compute(step);
+    }
     PressureReport pressure;
     shift_.set_count(fluid_.size());
     shift_.setZero();
@@ -594,6 +596,7 @@ class Simulator {
   FluidState<Scalar> fluid_{};
   Neighbors neighbors_;
   WallState<Scalar> walls_{};
+  GradientCorrection<Scalar> correction_{};
   double time_ = 0;
   double last_step_ = 0;
   std::uint32_t next_id_ = 0;

@@ -32,6 +32,7 @@ struct LooseLiquid {
   FluidState<Scalar> fluid{};
   Neighbors neighbors{};
   WallState<Scalar> walls{};
+  GradientCorrection<Scalar> correction{};
   Growable<Scalar, 3> shift{};
   Scalar spacing = Scalar(0.005);        ///< [m]
   Scalar smoothing_length = Scalar(0.005);  ///< [m]
@@ -74,10 +75,11 @@ struct LooseLiquid {
       });
       fluid.density[i] = density + rest_density * walls.share[i];
     }
+    correction.compute(view());
   }
 
   StepView<Kernel, Neighbors> view() {
-    return {fluid, neighbors, walls, shift, smoothing_length, spacing, rest_density, time_step, 0.0, threads};
+    return {fluid, neighbors, walls, correction, shift, smoothing_length, spacing, rest_density, time_step, 0.0, threads};
   }
 };
 

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Friction for what particles do and the liquid does not: motion too fine for the spacing to mean anything.
+
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <decant/boundary/wall_state.hpp>
+#include <decant/core/batch.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
+#include <decant/force/detail/pair_stiffness.hpp>
+
+namespace decant {
+
+/// Numerical viscosity that acts on velocity differences only so far as they are not linear in space:
+///   a_i = 10 nu sum_j (m_j / rho_0) (e_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij,   e_ij = v_ij - (G_i + G_j) x_ij / 2
+/// with the velocity gradients G_i = sum_j V_j (v_j - v_i) (L_i grad W_ij)^T and the corrected kernel gradients of
+/// GradientCorrection. Jitter from particle to particle is damped as by a viscosity nu, a wave of wave number k by
+/// (k d)^2 less: the idea of limiting artificial viscosity by a linear reconstruction is from Frontiere, Raskin and Owen
+/// 2017, "CRKSPH" (J. Comput. Phys. 332). The force acts along the line between two particles, so linear and angular
+/// momentum are kept to rounding.
+template <class ScalarType>
+struct ResidualViscosity {
+  using Scalar = ScalarType;
+  static constexpr bool uses_gradient_correction = true;
+
+  Scalar numerical_viscosity = Scalar(3e-4);  ///< nu [m^2/s], >= 0
+
+  template <class Step>
+  void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {
+    if (!(numerical_viscosity > 0)) {
+      return;
+    }
+    using Kernel = typename Step::Kernel;
+    using B = Batch<Scalar>;
+    compute_gradients(step);
+    const Scalar h = step.smoothing_length;
+    const Scalar softening = Scalar(0.01) * h * h;
+    const Scalar factor = 10 * numerical_viscosity / step.rest_density;
+    const Scalar* mass = step.fluid.mass.data();
+    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      const auto own = 4 * static_cast<std::size_t>(i);
+      B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
+      step.neighbors.for_each_batch(i, [&](const auto& pair) {
+        const auto other = gather3(velocity_.data(), pair.neighbor);
+        const auto along = [&](std::size_t axis) __attribute__((always_inline)) {
+          const Scalar* g = &gradient_[axis][own];
+          const auto other_g = gather3(gradient_[axis].data(), pair.neighbor);
+          return (other_g.x + g[0]) * pair.x + (other_g.y + g[1]) * pair.y + (other_g.z + g[2]) * pair.z;
+        };
+        const B half(Scalar(0.5));
+        const B residual = (velocity_[own] - other.x - half * along(0)) * pair.x +
+                           (velocity_[own + 1] - other.y - half * along(1)) * pair.y +
+                           (velocity_[own + 2] - other.z - half * along(2)) * pair.z;
+        const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B push = gather(mass, pair.neighbor) * residual * slope / (pair.distance_squared + softening);
+        x = multiply_add(push, pair.x, x);
+        y = multiply_add(push, pair.y, y);
+        z = multiply_add(push, pair.z, z);
+      });
+      acceleration.col(i) += factor * Vector3<Scalar>(sum(x), sum(y), sum(z));
+    });
+  }
+
+  /// Half of what an explicit step of the pair operator stands on a lattice (see Viscosity): the reconstruction feeds some
+  /// of the jitter back where particles are in disorder.
+  template <class Step>
+  Scalar largest_step(const Step& step) const noexcept {
+    if (!(numerical_viscosity > 0)) {
+      return std::numeric_limits<Scalar>::infinity();
+    }
+    const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
+    return Scalar(0.375) * Scalar(0.3) / (numerical_viscosity * stiffness);
+  }
+
+ private:
+  /// Walls take part as liquid that moves with them along their normal.
+  template <class Step>
+  void compute_gradients(const Step& step) noexcept {
+    using Kernel = typename Step::Kernel;
+    using B = Batch<Scalar>;
+    const Index count = step.fluid.size();
+    velocity_.resize(4 * static_cast<std::size_t>(count));
+    for (auto& rows : gradient_) {
+      rows.resize(4 * static_cast<std::size_t>(count));
+    }
+    parallel_for(count, step.threads, [&](Index i) {
+      for (Index axis = 0; axis < 3; ++axis) {
+        velocity_[static_cast<std::size_t>(4 * i + axis)] = step.fluid.velocity(axis, i);
+      }
+    });
+    const Scalar* mass = step.fluid.mass.data();
+    parallel_for(count, step.threads, [&](Index i) {
+      const auto own = 4 * static_cast<std::size_t>(i);
+      const B zero(Scalar(0));
+      std::array<Batch3<Scalar>, 3> rows{{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}}};
+      step.neighbors.for_each_batch(i, [&](const auto& pair) {
+        const B slope = gather(mass, pair.neighbor) *
+                        Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const auto other = gather3(velocity_.data(), pair.neighbor);
+        const std::array<B, 3> apart{other.x - velocity_[own], other.y - velocity_[own + 1],
+                                     other.z - velocity_[own + 2]};
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const B weight = slope * apart[axis];
+          rows[axis].x = multiply_add(weight, pair.x, rows[axis].x);
+          rows[axis].y = multiply_add(weight, pair.y, rows[axis].y);
+          rows[axis].z = multiply_add(weight, pair.z, rows[axis].z);
+        }
+      });
+      std::array<Vector3<Scalar>, 3> sums;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        sums[axis] = Vector3<Scalar>(sum(rows[axis].x), sum(rows[axis].y), sum(rows[axis].z)) / step.rest_density;
+      }
+      const WallContact<Scalar>* contacts = step.walls.contacts_of(i);
+      for (int k = 0; k < step.walls.contact_count[i]; ++k) {
+        const Vector3<Scalar>& wall = contacts[k].gradient;
+        const Scalar squared = wall.squaredNorm();
+        if (squared > 0) {
+          const Scalar approach = (contacts[k].velocity - step.fluid.velocity.col(i)).dot(wall) / squared;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            sums[axis] += approach * wall[static_cast<Index>(axis)] * wall;
+          }
+        }
+      }
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const Vector3<Scalar> row = step.correction.apply(i, sums[axis]);
+        Scalar* record = &gradient_[axis][own];
+        record[0] = row[0];
+        record[1] = row[1];
+        record[2] = row[2];
+        record[3] = 0;
+      }
+    });
+  }
+
+  std::vector<Scalar> velocity_{};                  ///< records of four, the last one unused
+  std::array<std::vector<Scalar>, 3> gradient_{};   ///< row by row of G, records of four
+};
+
+}  // namespace decant

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+#include <decant/force/residual_viscosity.hpp>
+
+#include <cmath>
+#include <optional>
+
+#include <decant/force/concept.hpp>
+#include <decant/force/viscosity.hpp>
+#include <decant/kernel/cubic_spline.hpp>
+#include <decant/kernel/wendland_c2.hpp>
+#include <decant/testing/force.hpp>
+
+#include "catch.hpp"
+#include "laws.hpp"
+
+using decant::CubicSpline;
+using decant::Index;
+using decant::PointArray;
+using decant::ResidualViscosity;
+using decant::Vector3;
+using namespace decant::testing;
+
+TEMPLATE_TEST_CASE("ResidualViscosity keeps the laws of a force", "", float, double) {
+  ResidualViscosity<TestType> force;
+  force.numerical_viscosity = TestType(1e-3);
+  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::linear_and_angular));
+  decant_test::check(force_laws<decant::WendlandC2<TestType>>(force, Keeps::linear_and_angular));
+}
+
+namespace {
+
+/// Power that a force takes out of the middle of a disordered ball with this velocity field, over what plain viscosity
+/// of the same size takes out of jitter as large as that field [-].
+template <class Velocity>
+double relative_power(Velocity&& velocity) {
+  using Kernel = CubicSpline<double>;
+  const double nu = 1e-3;
+  auto liquid = loose_ball<Kernel>(0.005, 8, 0.2, 1.0);
+  const auto power_over_square = [&](auto& force) {
+    PointArray<double> acceleration = PointArray<double>::Zero(3, liquid.fluid.size());
+    force.accumulate(liquid.view(), acceleration);
+    double power = 0, square = 0;
+    for (Index i = 0; i < liquid.fluid.size(); ++i) {
+      if (liquid.fluid.position.col(i).norm() < 5 * liquid.spacing) {
+        power -= acceleration.col(i).dot(liquid.fluid.velocity.col(i));
+        square += liquid.fluid.velocity.col(i).squaredNorm();
+      }
+    }
+    return power / square;
+  };
+  decant::Viscosity<double> plain;
+  plain.kinematic_viscosity = nu;
+  const double jitter = power_over_square(plain);
+  for (Index i = 0; i < liquid.fluid.size(); ++i) {
+    if (const auto v = velocity(Vector3<double>(liquid.fluid.position.col(i) / liquid.spacing)); v.has_value()) {
+      liquid.fluid.velocity.col(i) = *v;
+    }
+  }
+  ResidualViscosity<double> residual;
+  residual.numerical_viscosity = nu;
+  return power_over_square(residual) / jitter;
+}
+
+using Maybe = std::optional<Vector3<double>>;
+
+}  // namespace
+
+TEST_CASE("ResidualViscosity leaves linear velocities alone and brakes jitter as viscosity does") {
+  const auto linear = [](const Vector3<double>& x) {
+    return Maybe(Vector3<double>(0.3 * x.x() - x.y() + 1, 0.5 * x.z() - 0.2 * x.x(), -0.3 * x.z() + 0.1 * x.y()));
+  };
+  CHECK(std::abs(relative_power(linear)) < 1e-4);
+  const auto jitter = [](const Vector3<double>&) { return Maybe(); };
+  CHECK(relative_power(jitter) == Approx(1).margin(0.3));
+}
+
+TEST_CASE("ResidualViscosity brakes long waves by the square of their wave number less") {
+  const auto wave = [](double wave_number) {
+    return [wave_number](const Vector3<double>& x) {
+      return Maybe(Vector3<double>(0, std::sin(wave_number * x.x() + 0.4), 0));
+    };
+  };
+  const double longer = relative_power(wave(0.3)), shorter = relative_power(wave(0.6));
+  CHECK(longer > 0);
+  CHECK(longer < 0.02);
+  // fourth power of the wave number; plain viscosity has the second, 4
+  CHECK(shorter / longer > 10);
+  CHECK(shorter / longer < 20);
+}
