@@ -17,6 +17,7 @@
 
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/concept.hpp>
 #include <decant/boundary/half_space.hpp>
 #include <decant/boundary/mesh_wall.hpp>
 #include <decant/boundary/solid_parts.hpp>
@@ -28,24 +29,9 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
+#include <decant/kernel/cubic_spline.hpp>
 
 namespace decant {
-
-/// Names a body of a simulation; as an Origin, the liquid that started in it.
-using BodyId = std::uint32_t;
-
-/// How liquid moves along a wall.
-enum class Slip {
-  free,  ///< without friction: right where the boundary layer is thinner than a particle
-  none,  ///< the liquid at the wall moves with it, pulled by its viscosity
-};
-
-/// What guarding a step took.
-struct GuardReport {
-  Index slid = 0;     ///< particles whose path was bent at a wall
-  Index stopped = 0;  ///< particles that were held in place because no free path was found
-  Index lost = 0;     ///< particles squeezed between bodies that left no room: counted as lost through a wall
-};
 
 /// A set of rigid bodies, each with a pose at any time.
 /// MeshWallType decides how the liquid feels meshes: MeshWall (shadow integrals) or SampledWall (boundary particles).
@@ -140,7 +126,8 @@ class RigidBodies {
 
   /// Fills `walls` for particles at `position` 3xN [m], with the bodies as they stand at the start of the interval.
   /// @param spacing particle spacing [m].
-  void sample(const ConstPointsView<Scalar>& position, double spacing, Threads threads, WallState<Scalar>& walls) const {
+  void sample(const ConstPointsView<Scalar>& position, double spacing, Threads threads,
+              WallState<Scalar>& walls) const noexcept {
     walls.resize(position.cols());
     parallel_for(position.cols(), threads, [&](Index i) { sample_particle(i, position.col(i), spacing, walls); });
   }
@@ -183,7 +170,7 @@ class RigidBodies {
   /// `before` to `after` (3xN [m], changed) in time_step [s] while the bodies move through the interval; velocities of
   /// bent steps become what the step was. `walls` is as sampled at `before`.
   GuardReport guard(const ConstPointsView<Scalar>& before, double time_step, double clearance, Threads threads,
-                    const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const {
+                    const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     if (bodies_.empty()) {
       return {};
     }
@@ -364,5 +351,8 @@ class RigidBodies {
   HalfSpace half_space_{};  ///< of the simulation's kernel
   double reach_ = 0;        ///< of walls [m]
 };
+
+static_assert(Boundary<RigidBodies<float>, CubicSpline<float>>);
+static_assert(Boundary<RigidBodies<double>, CubicSpline<double>>);
 
 }  // namespace decant

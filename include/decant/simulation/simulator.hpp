@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <decant/boundary/rigid_bodies.hpp>
+#include <decant/boundary/concept.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
@@ -79,7 +79,7 @@ class Simulator {
   using Search = typename Parts::NeighborSearch;
   using Forces = typename Parts::Forces;
   using Solver = typename Parts::PressureSolver;
-  using Boundary = typename Parts::Boundary;
+  using Bodies = typename Parts::Boundary;
   using Neighbors = NeighborList<Scalar, Domain>;
   using Step = StepView<Kernel, Neighbors>;
 
@@ -91,6 +91,8 @@ class Simulator {
   static_assert([]<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
     return (ForceTerm<Terms, Step> && ...);
   }(std::type_identity<Forces>{}), "every type in Parts::Forces must model decant::ForceTerm, see <decant/force/concept.hpp>");
+  static_assert(Boundary<Bodies, Kernel>,
+                "Parts::Boundary must model decant::Boundary, see <decant/boundary/concept.hpp>");
 
   /// Throws std::invalid_argument if a setting is out of range.
   explicit Simulator(const SimulatorSettings& settings = {}, const Domain& domain = {})
@@ -217,7 +219,7 @@ class Simulator {
   /// them, until the mean speed is below `speed` [m/s]. Time does not advance, and velocities are zero afterwards.
   StepReport settle(double most_time = 2.0, double speed = 0.005) {
     const double start = time_;
-    Boundary moving = bodies_;
+    Bodies moving = bodies_;
     for (BodyId body = 0; body < bodies_.size(); ++body) {
       bodies_.set_motion(body, PoseTrack(moving[body].motion.at(start)));
     }
@@ -251,7 +253,7 @@ class Simulator {
   FluidState<Scalar>& fluid() noexcept { return fluid_; }
   const FluidState<Scalar>& fluid() const noexcept { return fluid_; }
 
-  const Boundary& bodies() const noexcept { return bodies_; }
+  const Bodies& bodies() const noexcept { return bodies_; }
   const SimulatorSettings& settings() const noexcept { return settings_; }
   const Domain& domain() const noexcept { return domain_; }
   double time() const noexcept { return time_; }  ///< [s]
@@ -288,7 +290,7 @@ class Simulator {
   struct Snapshot {
     FluidState<Scalar> fluid;
     typename Solver::Memory memory;
-    Boundary bodies;
+    Bodies bodies;
     double time, last_step;
     std::uint32_t next_id;
     Index lost;
@@ -588,7 +590,7 @@ class Simulator {
   Search search_;
   Forces forces_{};
   Solver solver_{};
-  Boundary bodies_{};
+  Bodies bodies_{};
   std::vector<InletWithOrigin> inlets_{};
 
   FluidState<Scalar> fluid_{};
