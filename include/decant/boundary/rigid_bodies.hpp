@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -19,6 +20,7 @@
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/concept.hpp>
 #include <decant/boundary/half_space.hpp>
+#include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/mesh_wall.hpp>
 #include <decant/boundary/solid_parts.hpp>
 #include <decant/boundary/swept_contact.hpp>
@@ -49,6 +51,7 @@ class RigidBodies {
     PoseTrack motion{};
     Slip slip = Slip::free;
     Eigen::AlignedBox3d bounds{};  ///< in the body's frame [m]
+    std::vector<std::string> warnings{};  ///< what is wrong with its mesh, one line each (boundary/mesh_report.hpp)
     Pose before{}, after{};        ///< at the ends of the current step
     RigidVelocity velocity{};      ///< between them
     double reach = 0;              ///< the farthest that any point of the body moves between them [m]
@@ -57,7 +60,8 @@ class RigidBodies {
   };
 
   /// Wall integrals are prepared for the kernel and particle spacing that are given. The number that is returned counts
-  /// up from 0.
+  /// up from 0. A mesh is looked over first: throws std::invalid_argument, one line, if it is empty, not finite, or of a
+  /// size that makes no sense at this spacing; what else is wrong with it is in the body's warnings.
   template <class Kernel>
   BodyId add(std::string name, BodyShape shape, PoseTrack motion, Slip slip, double smoothing_length, double spacing,
              Threads threads) {
@@ -68,6 +72,7 @@ class RigidBodies {
     body.shape = std::make_shared<const BodyShape>(std::move(shape));
     body.surface = std::make_shared<const BoundingVolumeHierarchy>(body.shape->mesh);
     if (body.shape->parts.empty()) {
+      body.warnings = warnings_about(body, spacing);
       body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
           MeshWallType::template of<Kernel>(*body.surface, smoothing_length, spacing, threads));
     } else {
@@ -198,6 +203,14 @@ class RigidBodies {
     Vector3<double> normal = Vector3<double>::Zero();
     Vector3<double> point = Vector3<double>::Zero();
   };
+
+  static std::vector<std::string> warnings_about(const Body& body, double spacing) {
+    MeshReport report = inspect(body.shape->mesh, spacing);
+    if (!report.refusals.empty()) {
+      throw std::invalid_argument("body '" + body.name + "': " + report.refusals.front());
+    }
+    return std::move(report.warnings);
+  }
 
   static Eigen::Isometry3d isometry(const Pose& pose) noexcept {
     Eigen::Isometry3d result = Eigen::Isometry3d::Identity();

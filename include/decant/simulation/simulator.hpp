@@ -14,6 +14,7 @@
 
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/concept.hpp>
+#include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
@@ -109,13 +110,24 @@ class Simulator {
   // ---- the scene --------------------------------------------------------------------------------------------------
 
   /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the body
-  /// is put is pushed out of its material.
+  /// is put is pushed out of its material. Throws std::invalid_argument for a mesh that is empty, not finite or of the
+  /// wrong size; flaws that it can live with are in bodies()[body].warnings, see also mesh_report.
   BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
     const BodyId body = bodies_.template add<Kernel>(std::move(name), std::move(shape), std::move(motion), slip,
                                                      smoothing_length_, settings_.spacing, settings_.threads);
     bodies_.set_interval(time_, 0);
     bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
     return body;
+  }
+
+  /// Looks a body's surface over as the body stands now, against gravity: its flaws in numbers and in words, and what
+  /// fits below its rim. Takes some tenths of a second for a scan.
+  MeshReport mesh_report(BodyId body) const {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    const Vector3<double> up = settings_.gravity.norm() > 0 ? Vector3<double>(-settings_.gravity.normalized())
+                                                            : Vector3<double>(Vector3<double>::UnitZ());
+    return inspect(bodies_[body].shape->mesh, settings_.spacing,
+                   bodies_[body].motion.at(time_).rotation.conjugate() * up);
   }
 
   /// Replaces a body's motion, from now on. While there is liquid, the new motion has to begin where the body is: a jump
