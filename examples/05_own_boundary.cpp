@@ -49,7 +49,8 @@ struct Flask {
       walls.flux[i] = 0;
       walls.distance[i] = static_cast<float>(std::min(distance, wall_.reach()));
       walls.contact_count[i] = near ? 1 : 0;
-      *walls.contacts_of(i) = {0, 0, walls.gradient.col(i), decant::Vector3<float>::Zero()};
+      *walls.contacts_of(i) = {};  // a wall without friction, at rest
+      walls.contacts_of(i)->gradient = walls.gradient.col(i);
     });
   }
 
