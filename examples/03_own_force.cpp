@@ -21,7 +21,7 @@ struct Wind {
   }
   template <class Step>
   Scalar largest_step(const Step&) const noexcept {
-    return Scalar(0.1) / rate;  // stable up to 2 / rate; a tenth of 1 / rate keeps the error of a step below one per cent
+    return Scalar(0.1) / rate;  // stable up to 2 / rate, accurate well below
   }
 };
 

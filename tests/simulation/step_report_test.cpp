@@ -50,7 +50,8 @@ Index inside(const Simulator<Parts>& simulator, BodyId body, const BoxInside& bo
   Index count = 0;
   for (Index i = 0; i < simulator.fluid().size(); ++i) {
     const Vector3<double> x = from_world * Vector3<double>(simulator.fluid().position.col(i).template cast<double>());
-    count += (x.array() > box.min.array()).all() && (x.head<2>().array() < box.max.head<2>().array()).all() && x.z() < top;
+    count +=
+        (x.array() > box.min.array()).all() && (x.head<2>().array() < box.max.head<2>().array()).all() && x.z() < top;
   }
   return count;
 }

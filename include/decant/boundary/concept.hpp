@@ -60,7 +60,7 @@ struct GuardReport {
 /// guard(before, time_step, clearance [m], threads, walls, fluid): the end of a sub-step. `walls` is as sampled at
 /// `before`, fluid.position is where particles want to go: bends steps that would cross a wall or end nearer to it than
 /// `clearance`, and takes the part of their velocity that points into it. What it lets pass has leaked.
-/// Results have to be the same bits for any number of threads.
+/// Results have to be the same bits for any number of threads. Laws: decant/testing/boundary.hpp.
 template <class B, class Kernel>
 concept Boundary =
     std::copyable<B> && std::default_initializable<B> &&

@@ -154,7 +154,8 @@ class Simulator {
 
   /// From the next frame on reports say how much liquid is in this body (StepReport::contents), asked as Contents does:
   /// in the body's own frame, so that what is above the plane of the rim is not in it. The body's space is looked for
-  /// here, some tenths of a second for a scan; a frame then takes about 20 ns more per particle and container.
+  /// here, some tenths of a second for a scan. A frame then takes about 60 ns more for each particle in the container
+  /// and 5 ns for each elsewhere, well below a per cent of its time.
   /// @param up the container's axis, out of its opening, in its own frame. Watching a body again replaces it.
   /// Throws std::invalid_argument if the body holds no liquid that way up, or if ContentsList::capacity are watched.
   void watch_contents(BodyId body, const Vector3<double>& up = Vector3<double>::UnitZ()) {
