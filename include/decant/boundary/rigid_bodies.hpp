@@ -204,14 +204,6 @@ class RigidBodies {
     Vector3<double> point = Vector3<double>::Zero();
   };
 
-  static std::vector<std::string> warnings_about(const Body& body, double spacing) {
-    MeshReport report = inspect(body.shape->mesh, spacing);
-    if (!report.refusals.empty()) {
-      throw std::invalid_argument("body '" + body.name + "': " + report.refusals.front());
-    }
-    return std::move(report.warnings);
-  }
-
   static Eigen::Isometry3d isometry(const Pose& pose) noexcept {
     Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
     result.linear() = pose.rotation.toRotationMatrix();
@@ -358,6 +350,14 @@ class RigidBodies {
     return std::any_of(bodies_.begin(), bodies_.end(), [&](const Body& body) {
       return body.surface->any_hit(body.from_world_before * x0, body.from_world_after * x1);
     });
+  }
+
+  static std::vector<std::string> warnings_about(const Body& body, double spacing) {
+    MeshReport report = inspect(body.shape->mesh, spacing);
+    if (!report.refusals.empty()) {
+      throw std::invalid_argument("body '" + body.name + "': " + report.refusals.front());
+    }
+    return std::move(report.warnings);
   }
 
   std::vector<Body> bodies_{};
