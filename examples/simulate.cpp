@@ -84,6 +84,9 @@ void write_report(const std::string& path, const decant::Scene& scene, const exa
   for (const std::string& note : result.notes) {
     report.paragraph(note);
   }
+  for (const std::string& warning : result.warnings) {
+    report.paragraph("Warning: " + warning);
+  }
   report.write(path);
 }
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -21,7 +22,6 @@
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/mesh_repair.hpp>
-#include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/io/liquid_picture.hpp>
@@ -56,7 +56,8 @@ struct RunOptions {
 struct RunResult {
   decant::Series series;  ///< t_s, then the gauges as they are named
   std::vector<decant::HtmlReport::Frame> pictures;
-  std::vector<std::string> notes;  ///< about meshes and fillings, one line each
+  std::vector<std::string> notes;     ///< about fillings, one line each
+  std::vector<std::string> warnings;  ///< about meshes, one line each; also printed to stderr
   std::string status = "ok";       ///< or why it ended early
   long particles = 0, lost = 0, spilled = 0;
   long sub_steps = 0, iterations = 0, unconverged_frames = 0;
@@ -74,9 +75,9 @@ inline std::optional<decant::Face> face_of(const std::optional<decant::scene::Fa
   return face ? std::optional<decant::Face>(face_of(*face)) : std::nullopt;
 }
 
-/// The shape of a body in the library's terms; meshes are read, looked over and mended. Throws std::runtime_error or
+/// The shape of a body in the library's terms; meshes are read and mended. Throws std::runtime_error or
 /// std::invalid_argument with one line about what is wrong with it.
-inline decant::BodyShape shape_of(const decant::scene::Body& body, double spacing, std::vector<std::string>& notes) {
+inline decant::BodyShape shape_of(const decant::scene::Body& body, double spacing) {
   using namespace decant;
   if (const auto* box = std::get_if<scene::Box>(&body.shape)) {
     return BodyShape(Box{box->min, box->max});
@@ -95,16 +96,7 @@ inline decant::BodyShape shape_of(const decant::scene::Body& body, double spacin
   }
   const auto& file = std::get<scene::Mesh>(body.shape);
   RepairReport repair;
-  const TriangleMesh mesh = repaired(scaled(read_mesh(file.file), file.scale), spacing, repair);
-  const MeshReport report = inspect(mesh, spacing);
-  const std::string name = "body '" + body.name + "': ";
-  if (!report.refusals.empty()) {
-    throw std::runtime_error(name + report.refusals.front());
-  }
-  for (const std::string& warning : report.warnings) {
-    notes.push_back(name + warning);
-  }
-  return BodyShape(mesh);
+  return BodyShape(repaired(scaled(read_mesh(file.file), file.scale), spacing, repair));
 }
 
 /// Places for liquid that fills a box: whole spacings along each axis, stretched to touch both sides. A box that is no
@@ -148,7 +140,14 @@ class SceneRun {
     set_solver();
     for (const decant::scene::Body& body : scene.bodies) {
       const auto slip = body.slip == decant::scene::Slip::None ? decant::Slip::none : decant::Slip::free;
-      simulator_.add_body(body.name, shape_of(body, scene.spacing, result_.notes), body.motion, slip);
+      const decant::BodyId added = simulator_.add_body(body.name, shape_of(body, scene.spacing), body.motion, slip);
+      if (std::holds_alternative<decant::scene::Mesh>(body.shape)) {
+        for (const std::string& warning : simulator_.mesh_report(added).warnings) {
+          result_.warnings.push_back("body '" + body.name + "': " + warning);
+          // at once: filling may fail because of it
+          std::fprintf(stderr, "warning: %s\n", result_.warnings.back().c_str());
+        }
+      }
       prepared_.push_back({});
     }
     for (std::size_t k = 0; k < scene.fluid.size(); ++k) {

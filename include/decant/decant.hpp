@@ -6,6 +6,7 @@
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/cavity.hpp>
+#include <decant/boundary/concept.hpp>
 #include <decant/boundary/half_space.hpp>
 #include <decant/boundary/mesh_repair.hpp>
 #include <decant/boundary/mesh_report.hpp>

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <decant/boundary/mesh_report.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include <decant/boundary/shapes.hpp>
 #include <decant/io/mesh_file.hpp>
@@ -110,6 +113,30 @@ TEST_CASE("walls and sizes are held against the spacing") {
     REQUIRE_THROWS_WITH(decant::inspect(cup(0.002), bad), decant_test::contains("MeshReport: particle spacing [m]"));
   }
   REQUIRE_THROWS_WITH(decant::inspect(TriangleMesh{}, 1), decant_test::contains("number of triangles"));
+}
+
+TEST_CASE("what a mesh holds is reported for the way up that is asked for") {
+  const TriangleMesh glass = decant::CylinderInside{0.05, 0.1, 0.003, Face::PositiveZ}.mesh();
+  REQUIRE(std::isnan(decant::inspect(glass, 0.005).cavity_volume));
+  MeshReport report = decant::inspect(glass, 0.005, Point::UnitZ());
+  // columns give volumes within 0.3 %, the mesh's polygon lacks a little of the circle
+  REQUIRE(report.cavity_volume == Approx(std::acos(-1.0) * 0.05 * 0.05 * 0.1).epsilon(5e-3));
+  REQUIRE(report.warnings.empty());
+  report = decant::inspect(glass, 0.005, -Point::UnitZ());
+  REQUIRE(report.cavity_volume == 0);
+  REQUIRE(report.warnings.empty());  // as any solid
+  // three particles to its width
+  report = decant::inspect(decant::scaled(glass, 0.15), 0.005, Point::UnitZ());
+  REQUIRE(says(report.warnings, "holds 2.65 ml below its rim this way up, no more than 22 particles of 5 mm"));
+
+  TriangleMesh torn = glass;
+  std::erase_if(torn.triangles, [&](const TriangleMesh::Triangle& triangle) {
+    return std::all_of(triangle.begin(), triangle.end(), [&](auto vertex) { return glass.vertices[vertex][2] < 0.001; });
+  });
+  REQUIRE(torn.triangles.size() < glass.triangles.size());
+  report = decant::inspect(torn, 0.005, Point::UnitZ());
+  REQUIRE(report.cavity_volume == 0);
+  REQUIRE(says(report.warnings, "holds no liquid this way up"));
 }
 
 TEST_CASE("scans have the defects that are known of them") {

@@ -77,7 +77,7 @@ std::vector<long> allocations_per_frame(int threads, int warm_up, int frames) {
     rocking.push_back({t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(7 * t), Eigen::Vector3d::UnitY())), {}}});
     rocking.back().pose.translation.setZero();
   }
-  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.06, 0.06, 0.08}, 0.002, {}}, PoseTrack(rocking));
+  const BodyId box = simulator.add_body("box", BoxInside{{0, 0, 0}, {0.06, 0.06, 0.08}, 0.002, {}}, PoseTrack(rocking));
   simulator.add_body("post", TriangleMesh(Cylinder{0.008, 0.1}.mesh()),
                      PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.03, 0.03, -0.1}}));
   constexpr int side = 10, layers = 7;
@@ -91,6 +91,7 @@ std::vector<long> allocations_per_frame(int threads, int warm_up, int frames) {
     }
   }
   simulator.add_particles(x, PointArray<Scalar>::Zero(3, n), 0);
+  simulator.watch_contents(box);
   std::vector<long> counts;
   for (int k = 0; k < warm_up + frames; ++k) {
     allocations = 0;
@@ -99,6 +100,7 @@ std::vector<long> allocations_per_frame(int threads, int warm_up, int frames) {
     watching = false;
     const long count = allocations;
     REQUIRE(report.advanced());
+    REQUIRE(report.contents[0].particles == n);
     if (k >= warm_up) {
       counts.push_back(count);
     }

@@ -207,6 +207,36 @@ TEST_CASE("simulator: settling brings to rest without letting time pass") {
   CHECK(simulator.fluid().size() > 108);
 }
 
+TEST_CASE("simulator: meshes are looked over when they are added") {
+  LiquidSimulator simulator(with_spacing(0.008));
+  const TriangleMesh glass = CylinderInside{0.05, 0.1, 0.003, Face::PositiveZ}.mesh();
+  TriangleMesh torn = glass;
+  torn.triangles.erase(torn.triangles.begin());
+  std::swap(torn.triangles[5][0], torn.triangles[5][1]);
+  const Pose over{Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(-1.0), Eigen::Vector3d::UnitX())), {1, 0, 0.2}};
+  const BodyId sound = simulator.add_body("sound", glass);
+  const BodyId turned = simulator.add_body("turned", glass, PoseTrack(over));
+  const BodyId damaged = simulator.add_body("damaged", torn, PoseTrack(Pose{Eigen::Quaterniond::Identity(), {2, 0, 0}}));
+  CHECK(simulator.bodies()[sound].warnings.empty());
+  CHECK(simulator.bodies()[turned].warnings.empty());
+  REQUIRE(simulator.bodies()[damaged].warnings.size() == 2);
+  CHECK(simulator.bodies()[damaged].warnings[0].find("surface is open: 3 open edges in 1 loop") == 0);
+  CHECK(simulator.bodies()[damaged].warnings[1].find("orientation changes at") == 0);
+
+  const double capacity = std::acos(-1.0) * 0.05 * 0.05 * 0.1;
+  CHECK(simulator.mesh_report(sound).cavity_volume == Approx(capacity).epsilon(5e-3));
+  CHECK(simulator.mesh_report(turned).cavity_volume == 0);
+  CHECK(simulator.mesh_report(damaged).open_edges == 3);
+  CHECK(simulator.mesh_report(damaged).warnings[0] == simulator.bodies()[damaged].warnings[0]);
+  CHECK_THROWS_WITH(simulator.mesh_report(3), decant_test::contains("body must be one that was added"));
+
+  CHECK_THROWS_WITH(simulator.add_body("cup", scaled(glass, 1000)),
+                    "body 'cup': body is 106 m large, more than 5000 particles of 8 mm: is the file in millimetres (scale "
+                    "0.001)?");
+  CHECK_THROWS_WITH(simulator.add_body("crumb", scaled(glass, 0.01)), decant_test::contains("body 'crumb'"));
+  CHECK(simulator.bodies().size() == 3);
+}
+
 TEST_CASE("simulator: parts take their settings from the simulator") {
   SimulatorSettings settings = with_spacing(0.005);
   settings.gravity = {1, 2, 3};

@@ -60,6 +60,22 @@ if(CASE STREQUAL "simulate_runs_a_scene")
     endif()
   endforeach()
 
+elseif(CASE STREQUAL "simulate_warns_about_a_mesh")
+  # a tray of paper, without thickness
+  file(WRITE "${SCRATCH}/tray.obj" "v 0 0 0\nv 0.1 0 0\nv 0.1 0.05 0\nv 0 0.05 0\nv 0 0 0.05\nv 0.1 0 0.05\nv 0.1 0.05 0.05\n"
+       "v 0 0.05 0.05\nf 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
+  file(WRITE "${SCRATCH}/scene.json" "${scene_head}, \"spacing_m\": 0.01, \"end_s\": 0.05,
+  \"bodies\": [{\"name\": \"tray\", \"shape\": {\"mesh\": \"tray.obj\"}}],
+  \"fluid\": [{\"box\": {\"min_m\": [0.01, 0.01, 0.01], \"max_m\": [0.05, 0.04, 0.04]}}], \"gauges\": [\"volume_ml@tray\"]}")
+  run(0 scene.json --json out.json --report out.html)
+  if(NOT errors MATCHES "warning: body 'tray': surface is open: 4 open edges in 1 loop")
+    message(FATAL_ERROR "no warning of an open mesh:\n${errors}")
+  endif()
+  file(READ "${SCRATCH}/out.html" report)
+  if(NOT report MATCHES "surface is open: 4 open edges")
+    message(FATAL_ERROR "the report does not say that the mesh is open")
+  endif()
+
 elseif(CASE STREQUAL "simulate_refuses_a_bad_scene")
   run(2 missing.json --json out.json)
   expect_one_line("${errors}" "missing.json")

@@ -20,7 +20,7 @@ struct BodyShape {
 
   BodyShape() = default;
 
-  /// Any mesh. Inspect meshes from files first (boundary/mesh_report.hpp).
+  /// Any mesh. Those from files may need repair first (boundary/mesh_repair.hpp).
   BodyShape(TriangleMesh surface) : mesh(std::move(surface)) {}
 
   BodyShape(const Box& box) : mesh(box.mesh()), parts{SolidBox{box.min, box.max}} {}

@@ -225,7 +225,7 @@ inline TriangleMesh repaired(const TriangleMesh& mesh, double spacing, RepairRep
   }
   if (report.closed_holes > 0) {
     report.lines.push_back("closed " + counted(report.closed_holes, "hole") + " narrower than " +
-                           detail::millimetres(spacing) + " with " + counted(report.added_triangles, "triangle"));
+                           detail::length_text(spacing) + " with " + counted(report.added_triangles, "triangle"));
   }
   if (report.turned_triangles > 0) {
     report.lines.push_back("turned " + counted(report.turned_triangles, "triangle") + " to look out of the material");

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/cavity.hpp>
 #include <decant/boundary/detail/mesh_topology.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
@@ -46,6 +47,9 @@ struct MeshReport {
   bool inside_out = false;                         ///< closed, but triangles face into the material
   double thinnest_wall =
       std::numeric_limits<double>::infinity();  ///< 99 % of the surface have a thicker one; 0 of a sheet [m]
+
+  /// What fits below the rim [m^3]; NaN where it was not asked for.
+  double cavity_volume = std::numeric_limits<double>::quiet_NaN();
 
   /// No edge is open: the surface separates inside from outside, though perhaps not with one orientation.
   bool closed() const noexcept { return open_edges == 0; }
@@ -116,10 +120,15 @@ inline std::string counted(std::size_t count, const std::string& noun) {
   return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
 }
 
-inline std::string millimetres(double length) {
+// "3.5 mm" or "106 m".
+inline std::string length_text(double length) {
   std::ostringstream text;
   text.precision(3);
-  text << 1000 * length << " mm";
+  if (length < 1) {
+    text << 1000 * length << " mm";
+  } else {
+    text << length << " m";
+  }
   return text.str();
 }
 
@@ -176,11 +185,11 @@ inline MeshReport inspect(const TriangleMesh& mesh, double spacing) {
   report.thinnest_wall = sheet ? 0 : detail::thinnest_wall(merged, surface);
 
   using detail::counted;
-  using detail::millimetres;
+  using detail::length_text;
   if (report.open_edges > 0) {
     const double widest = report.loops.empty() ? 0 : report.loops.front().width;
     std::string line = "surface is open: " + counted(report.open_edges, "open edge") + " in " +
-                       counted(report.loops.size(), "loop") + ", the widest " + millimetres(widest) + " across";
+                       counted(report.loops.size(), "loop") + ", the widest " + length_text(widest) + " across";
     line += widest < spacing ? " (narrower than a particle: can be closed by repair)"
                              : " (wider than a particle: liquid may pass, and the body is taken for a thin sheet)";
     report.warnings.push_back(std::move(line));
@@ -203,17 +212,39 @@ inline MeshReport inspect(const TriangleMesh& mesh, double spacing) {
   }
   if (!sheet && report.thinnest_wall < 0.05 * spacing) {
     // a scan's defect rather than a wall; swept contact holds it, but pictures and counts of material will not
-    report.warnings.push_back("thinnest wall is " + millimetres(report.thinnest_wall) +
-                              ", a twentieth of the particle " + "spacing of " + millimetres(spacing) + " or less");
+    report.warnings.push_back("thinnest wall is " + length_text(report.thinnest_wall) +
+                              ", a twentieth of the particle " + "spacing of " + length_text(spacing) + " or less");
   }
   const double largest = report.size.maxCoeff();
   if (largest > 5000 * spacing) {
-    report.refusals.push_back("body is " + millimetres(largest) + " large, more than 5000 particles of " +
-                              millimetres(spacing) + ": is the file in millimetres (scale 0.001)?");
+    report.refusals.push_back("body is " + length_text(largest) + " large, more than 5000 particles of " +
+                              length_text(spacing) + ": is the file in millimetres (scale 0.001)?");
   }
   if (largest < spacing) {
-    report.refusals.push_back("body is " + millimetres(largest) + " large, less than one particle of " +
-                              millimetres(spacing) + ": is its scale right?");
+    report.refusals.push_back("body is " + length_text(largest) + " large, less than one particle of " +
+                              length_text(spacing) + ": is its scale right?");
+  }
+  return report;
+}
+
+/// Looks over a mesh that is to stand with `up` (its own frame, any length but 0) up: also what it holds. Takes some
+/// tenths of a second longer.
+inline MeshReport inspect(const TriangleMesh& mesh, double spacing, const Vector3<double>& up) {
+  MeshReport report = inspect(mesh, spacing);
+  const Cavity cavity(mesh, up);
+  report.cavity_volume = cavity.volume();
+  std::ostringstream text;
+  text.precision(3);
+  // Rims hold liquid back by about a particle: of a hollow less than four across they would rule a large part.
+  const double particles = cavity.volume() / (spacing * spacing * spacing);
+  if (particles > 0 && particles < 64) {
+    text << "holds " << 1e6 * cavity.volume() << " ml below its rim this way up, no more than " << std::ceil(particles)
+         << " particles of " << detail::length_text(spacing);
+  } else if (cavity.empty() && !report.closed()) {
+    text << "holds no liquid this way up: its opening looks down, or there is a hole low in its wall";
+  }
+  if (!text.str().empty()) {
+    report.warnings.push_back(text.str());
   }
   return report;
 }

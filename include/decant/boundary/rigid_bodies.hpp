@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -17,7 +18,9 @@
 
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/concept.hpp>
 #include <decant/boundary/half_space.hpp>
+#include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/mesh_wall.hpp>
 #include <decant/boundary/solid_parts.hpp>
 #include <decant/boundary/swept_contact.hpp>
@@ -28,24 +31,9 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
+#include <decant/kernel/cubic_spline.hpp>
 
 namespace decant {
-
-/// Names a body of a simulation; as an Origin, the liquid that started in it.
-using BodyId = std::uint32_t;
-
-/// How liquid moves along a wall.
-enum class Slip {
-  free,  ///< without friction: right where the boundary layer is thinner than a particle
-  none,  ///< the liquid at the wall moves with it, pulled by its viscosity
-};
-
-/// What guarding a step took.
-struct GuardReport {
-  Index slid = 0;     ///< particles whose path was bent at a wall
-  Index stopped = 0;  ///< particles that were held in place because no free path was found
-  Index lost = 0;     ///< particles squeezed between bodies that left no room: counted as lost through a wall
-};
 
 /// A set of rigid bodies, each with a pose at any time.
 /// MeshWallType decides how the liquid feels meshes: MeshWall (shadow integrals) or SampledWall (boundary particles).
@@ -63,6 +51,7 @@ class RigidBodies {
     PoseTrack motion{};
     Slip slip = Slip::free;
     Eigen::AlignedBox3d bounds{};  ///< in the body's frame [m]
+    std::vector<std::string> warnings{};  ///< what is wrong with its mesh, one line each (boundary/mesh_report.hpp)
     Pose before{}, after{};        ///< at the ends of the current step
     RigidVelocity velocity{};      ///< between them
     double reach = 0;              ///< the farthest that any point of the body moves between them [m]
@@ -71,7 +60,8 @@ class RigidBodies {
   };
 
   /// Wall integrals are prepared for the kernel and particle spacing that are given. The number that is returned counts
-  /// up from 0.
+  /// up from 0. A mesh is looked over first: throws std::invalid_argument, one line, if it is empty, not finite, or of a
+  /// size that makes no sense at this spacing; what else is wrong with it is in the body's warnings.
   template <class Kernel>
   BodyId add(std::string name, BodyShape shape, PoseTrack motion, Slip slip, double smoothing_length, double spacing,
              Threads threads) {
@@ -82,6 +72,7 @@ class RigidBodies {
     body.shape = std::make_shared<const BodyShape>(std::move(shape));
     body.surface = std::make_shared<const BoundingVolumeHierarchy>(body.shape->mesh);
     if (body.shape->parts.empty()) {
+      body.warnings = warnings_about(body, spacing);
       body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
           MeshWallType::template of<Kernel>(*body.surface, smoothing_length, spacing, threads));
     } else {
@@ -152,7 +143,8 @@ class RigidBodies {
 
   /// Fills `walls` for particles at `position` 3xN [m], with the bodies as they stand at the start of the interval.
   /// @param spacing particle spacing [m].
-  void sample(const ConstPointsView<Scalar>& position, double spacing, Threads threads, WallState<Scalar>& walls) const {
+  void sample(const ConstPointsView<Scalar>& position, double spacing, Threads threads,
+              WallState<Scalar>& walls) const noexcept {
     walls.resize(position.cols());
     parallel_for(position.cols(), threads, [&](Index i) { sample_particle(i, position.col(i), spacing, walls); });
   }
@@ -195,7 +187,7 @@ class RigidBodies {
   /// `before` to `after` (3xN [m], changed) in time_step [s] while the bodies move through the interval; velocities of
   /// bent steps become what the step was. `walls` is as sampled at `before`.
   GuardReport guard(const ConstPointsView<Scalar>& before, double time_step, double clearance, Threads threads,
-                    const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const {
+                    const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     if (bodies_.empty()) {
       return {};
     }
@@ -375,9 +367,20 @@ class RigidBodies {
     });
   }
 
+  static std::vector<std::string> warnings_about(const Body& body, double spacing) {
+    MeshReport report = inspect(body.shape->mesh, spacing);
+    if (!report.refusals.empty()) {
+      throw std::invalid_argument("body '" + body.name + "': " + report.refusals.front());
+    }
+    return std::move(report.warnings);
+  }
+
   std::vector<Body> bodies_{};
   HalfSpace half_space_{};  ///< of the simulation's kernel
   double reach_ = 0;        ///< of walls [m]
 };
+
+static_assert(Boundary<RigidBodies<float>, CubicSpline<float>>);
+static_assert(Boundary<RigidBodies<double>, CubicSpline<double>>);
 
 }  // namespace decant

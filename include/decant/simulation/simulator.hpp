@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include <decant/boundary/rigid_bodies.hpp>
+#include <decant/boundary/cavity.hpp>
+#include <decant/boundary/concept.hpp>
+#include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
@@ -79,7 +82,7 @@ class Simulator {
   using Search = typename Parts::NeighborSearch;
   using Forces = typename Parts::Forces;
   using Solver = typename Parts::PressureSolver;
-  using Boundary = typename Parts::Boundary;
+  using Bodies = typename Parts::Boundary;
   using Neighbors = NeighborList<Scalar, Domain>;
   using Step = StepView<Kernel, Neighbors>;
 
@@ -91,6 +94,8 @@ class Simulator {
   static_assert([]<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
     return (ForceTerm<Terms, Step> && ...);
   }(std::type_identity<Forces>{}), "every type in Parts::Forces must model decant::ForceTerm, see <decant/force/concept.hpp>");
+  static_assert(Boundary<Bodies, Kernel>,
+                "Parts::Boundary must model decant::Boundary, see <decant/boundary/concept.hpp>");
 
   /// Throws std::invalid_argument if a setting is out of range.
   explicit Simulator(const SimulatorSettings& settings = {}, const Domain& domain = {})
@@ -105,13 +110,24 @@ class Simulator {
   // ---- the scene --------------------------------------------------------------------------------------------------
 
   /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the body
-  /// is put is pushed out of its material.
+  /// is put is pushed out of its material. Throws std::invalid_argument for a mesh that is empty, not finite or of the
+  /// wrong size; flaws that it can live with are in bodies()[body].warnings, see also mesh_report.
   BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
     const BodyId body = bodies_.template add<Kernel>(std::move(name), std::move(shape), std::move(motion), slip,
                                                      smoothing_length_, settings_.spacing, settings_.threads);
     bodies_.set_interval(time_, 0);
     bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
     return body;
+  }
+
+  /// Looks a body's surface over as the body stands now, against gravity: its flaws in numbers and in words, and what
+  /// fits below its rim. Takes some tenths of a second for a scan.
+  MeshReport mesh_report(BodyId body) const {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    const Vector3<double> up = settings_.gravity.norm() > 0 ? Vector3<double>(-settings_.gravity.normalized())
+                                                            : Vector3<double>(Vector3<double>::UnitZ());
+    return inspect(bodies_[body].shape->mesh, settings_.spacing,
+                   bodies_[body].motion.at(time_).rotation.conjugate() * up);
   }
 
   /// Replaces a body's motion, from now on. While there is liquid, the new motion has to begin where the body is: a jump
@@ -134,6 +150,28 @@ class Simulator {
             duration);
     const Pose now = bodies_[body].motion.at(time_);
     bodies_.set_motion(body, PoseTrack({{time_, now}, {time_ + duration, pose}}));
+  }
+
+  /// From the next frame on reports say how much liquid is in this body (StepReport::contents), asked as Contents does:
+  /// in the body's own frame, so that what is above the plane of the rim is not in it. The body's space is looked for
+  /// here, some tenths of a second for a scan. A frame then takes about 60 ns more for each particle in the container
+  /// and 5 ns for each elsewhere, well below a per cent of its time.
+  /// @param up the container's axis, out of its opening, in its own frame. Watching a body again replaces it.
+  /// Throws std::invalid_argument if the body holds no liquid that way up, or if ContentsList::capacity are watched.
+  void watch_contents(BodyId body, const Vector3<double>& up = Vector3<double>::UnitZ()) {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    auto cavity = std::make_shared<const Cavity>(bodies_[body].surface, up);
+    expects(!cavity->empty(), "Simulator: body '" + bodies_[body].name + "' to watch", "one that holds liquid",
+            "no cavity");
+    for (auto& [watched, space] : watched_) {
+      if (watched == body) {
+        space = std::move(cavity);
+        return;
+      }
+    }
+    expects(watched_.size() < ContentsList::capacity, "Simulator: number of watched containers",
+            "at most " + std::to_string(ContentsList::capacity), watched_.size() + 1);
+    watched_.push_back({body, std::move(cavity)});
   }
 
   /// Adds particles of one spacing's volume each. @param position, velocity 3xN, [m] and [m/s], world frame, finite.
@@ -210,6 +248,7 @@ class Simulator {
     lost_ += report.advanced() ? report.lost : 0;
     report.lost = lost_;
     summarize(report);
+    count_contents(report);
     return report;
   }
 
@@ -217,7 +256,7 @@ class Simulator {
   /// them, until the mean speed is below `speed` [m/s]. Time does not advance, and velocities are zero afterwards.
   StepReport settle(double most_time = 2.0, double speed = 0.005) {
     const double start = time_;
-    Boundary moving = bodies_;
+    Bodies moving = bodies_;
     for (BodyId body = 0; body < bodies_.size(); ++body) {
       bodies_.set_motion(body, PoseTrack(moving[body].motion.at(start)));
     }
@@ -251,7 +290,7 @@ class Simulator {
   FluidState<Scalar>& fluid() noexcept { return fluid_; }
   const FluidState<Scalar>& fluid() const noexcept { return fluid_; }
 
-  const Boundary& bodies() const noexcept { return bodies_; }
+  const Bodies& bodies() const noexcept { return bodies_; }
   const SimulatorSettings& settings() const noexcept { return settings_; }
   const Domain& domain() const noexcept { return domain_; }
   double time() const noexcept { return time_; }  ///< [s]
@@ -288,19 +327,21 @@ class Simulator {
 
   // ---- snapshots --------------------------------------------------------------------------------------------------
 
-  /// All that the future depends on. A run that is restored continues bit for bit as the first one did.
+  /// All that the future depends on, and which containers are watched. A run that is restored continues bit for bit as the first one did.
   struct Snapshot {
     FluidState<Scalar> fluid;
     typename Solver::Memory memory;
-    Boundary bodies;
+    Bodies bodies;
     double time, last_step;
     std::uint32_t next_id;
     Index lost;
     std::vector<std::pair<Inlet, Origin>> inlets;
+    std::vector<std::pair<BodyId, std::shared_ptr<const Cavity>>> watched;
   };
 
   Snapshot snapshot() const {
-    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, last_step_, next_id_, lost_, inlets_};
+    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, last_step_, next_id_, lost_, inlets_,
+            watched_};
   }
 
   void restore(const Snapshot& snapshot) {
@@ -312,10 +353,12 @@ class Simulator {
     next_id_ = snapshot.next_id;
     lost_ = snapshot.lost;
     inlets_ = snapshot.inlets;
+    watched_ = snapshot.watched;
   }
 
  private:
   using InletWithOrigin = std::pair<Inlet, Origin>;
+  using Watched = std::pair<BodyId, std::shared_ptr<const Cavity>>;
 
   template <class Part>
   static constexpr bool wants_correction = requires { requires Part::uses_gradient_correction; };
@@ -584,14 +627,41 @@ class Simulator {
     report.volume = mass / settings_.liquid.density;
   }
 
+  void count_contents(StepReport& report) noexcept {
+    for (const Watched& watched : watched_) {
+      const Cavity& cavity = *watched.second;
+      const Pose body_from_world = bodies_[watched.first].motion.at(time_).inverse();
+      const Matrix3<double> turn = body_from_world.rotation.toRotationMatrix();
+      ContainedLiquid contained = counting_.over(
+          fluid_.size(), settings_.threads, ContainedLiquid{},
+          [&](Index begin, Index end) {
+            ContainedLiquid found;
+            for (Index i = begin; i < end; ++i) {
+              const Vector3<double> x = fluid_.position.col(i).template cast<double>();
+              if (cavity.contains(turn * x + body_from_world.translation)) {
+                ++found.particles;
+                found.volume += static_cast<double>(fluid_.mass[i]) / settings_.liquid.density;
+              }
+            }
+            return found;
+          },
+          [](const ContainedLiquid& a, const ContainedLiquid& b) {
+            return ContainedLiquid{a.body, a.particles + b.particles, a.volume + b.volume};
+          });
+      contained.body = watched.first;
+      report.contents.push_back(contained);
+    }
+  }
+
   SimulatorSettings settings_;
   Domain domain_;
   double smoothing_length_ = 0;
   Search search_;
   Forces forces_{};
   Solver solver_{};
-  Boundary bodies_{};
+  Bodies bodies_{};
   std::vector<InletWithOrigin> inlets_{};
+  std::vector<Watched> watched_{};
 
   FluidState<Scalar> fluid_{};
   Neighbors neighbors_;
@@ -610,6 +680,7 @@ class Simulator {
   Growable<Scalar, 1> scratch_scalars_{};
   Growable<std::uint32_t, 1> scratch_numbers_{};
   Reduction<double> reduction_{};
+  Reduction<ContainedLiquid> counting_{};
   FluidState<Scalar> kept_fluid_{};
   typename Solver::Memory kept_memory_{};
   std::vector<InletWithOrigin> kept_inlets_{};

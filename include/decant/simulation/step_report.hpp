@@ -3,9 +3,10 @@
 
 /// What a frame of simulation took, and how it went.
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
-#include <vector>
 
 #include <decant/core/types.hpp>
 
@@ -30,6 +31,47 @@ constexpr std::string_view to_string(StepStatus status) {
   return "unknown";
 }
 
+/// Liquid in one container that is watched (Simulator::watch_contents).
+struct ContainedLiquid {
+  std::uint32_t body = 0;  ///< a BodyId
+  Index particles = 0;     ///< below the container's rim, however it is tilted
+  double volume = 0;       ///< theirs, mass over rest density [m^3]
+};
+
+/// One entry per watched container, in the order in which watching began. Holds its entries in itself, so that reports
+/// are copied and kept without allocation.
+class ContentsList {
+ public:
+  static constexpr std::size_t capacity = 16;  ///< so many containers can be watched
+
+  const ContainedLiquid* begin() const noexcept { return entries_.data(); }
+  const ContainedLiquid* end() const noexcept { return entries_.data() + size_; }
+  std::size_t size() const noexcept { return size_; }
+  bool empty() const noexcept { return size_ == 0; }
+  const ContainedLiquid& operator[](std::size_t place) const noexcept { return entries_[place]; }
+
+  /// What is in a body; nullptr if that is not watched.
+  const ContainedLiquid* find(std::uint32_t body) const noexcept {
+    for (const ContainedLiquid& entry : *this) {
+      if (entry.body == body) {
+        return &entry;
+      }
+    }
+    return nullptr;
+  }
+
+  /// Appends an entry; what is beyond the capacity is left out.
+  void push_back(const ContainedLiquid& entry) noexcept {
+    if (size_ < capacity) {
+      entries_[size_++] = entry;
+    }
+  }
+
+ private:
+  std::array<ContainedLiquid, capacity> entries_{};
+  std::size_t size_ = 0;
+};
+
 /// One frame. Sums and maxima are over the frame's sub-steps.
 struct StepReport {
   StepStatus status = StepStatus::ok;
@@ -44,6 +86,7 @@ struct StepReport {
   Index guarded = 0;               ///< steps that swept contact had to bend
   Index lost = 0;                  ///< particles that passed a wall because bodies left them no room, since the start
   Index non_finite = 0;            ///< particles with a non-finite position or velocity (status non_finite)
+  ContentsList contents{};         ///< of the containers that are watched, at the end of the frame
 
   /// True if the frame was simulated; false if the state is unchanged.
   bool advanced() const { return status == StepStatus::ok || status == StepStatus::not_converged; }

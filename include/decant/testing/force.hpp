@@ -40,7 +40,9 @@ struct LooseLiquid {
   Scalar time_step = Scalar(1e-3);       ///< [s]
   Threads threads{1};
 
-  /// Puts particles of one spacing's volume at these places, at rest, and finds neighbours and densities.
+  /// Puts particles of one spacing's volume at these places, at rest, and finds neighbours and densities. Benchmarks
+  /// name a faster Search.
+  template <class Search = BruteForce<Scalar>>
   void place(const PointArray<Scalar>& position) {
     fluid.resize(position.cols());
     fluid.position = position;
@@ -59,12 +61,13 @@ struct LooseLiquid {
     walls.flux.setZero();
     walls.distance.setConstant(static_cast<Scalar>(Kernel::support_factor) * smoothing_length);
     walls.contact_count.setZero();
-    update();
+    update<Search>();
   }
 
   /// Finds neighbours and densities again after positions have changed. @param margin see PressureSolver::search_margin.
+  template <class Search = BruteForce<Scalar>>
   void update(double margin = 0) {
-    BruteForce<Scalar> search;
+    Search search;
     neighbors.build(search, fluid.position,
                     static_cast<Scalar>(static_cast<double>(Kernel::support_factor) * (1 + margin)) * smoothing_length,
                     threads);
