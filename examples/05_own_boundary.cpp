@@ -31,7 +31,10 @@ struct Flask {
   void set_motion(decant::BodyId, decant::PoseTrack motion) { flask_.motion = motion; }  // but it stays where it is
   decant::Index push_out(decant::BodyId, double, decant::FluidState<float>&) const { return 0; }
   void set_interval(double, double) noexcept {}
-  double largest_speed(double, double) const noexcept { return 0; }
+  double largest_relative_speed(const decant::FluidState<float>& fluid, decant::Threads,
+                                decant::Reduction<double>&) const noexcept {
+    return static_cast<double>(fluid.size() > 0 ? fluid.velocity.colwise().norm().maxCoeff<Eigen::PropagateNaN>() : 0);
+  }
   bool separated(const decant::Vector3<float>&, const decant::Vector3<float>&, const decant::WallContact<float>*,
                  int) const noexcept {
     return false;  // all liquid is on one side
@@ -51,6 +54,7 @@ struct Flask {
       walls.contact_count[i] = near ? 1 : 0;
       *walls.contacts_of(i) = {};  // a wall without friction, at rest
       walls.contacts_of(i)->gradient = walls.gradient.col(i);
+      walls.contacts_of(i)->distance = static_cast<float>(distance);
     });
   }
 

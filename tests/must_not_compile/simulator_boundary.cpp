@@ -21,7 +21,9 @@ struct NoWalls {
   void set_motion(decant::BodyId, decant::PoseTrack) {}
   decant::Index push_out(decant::BodyId, double, decant::FluidState<double>&) const { return 0; }
   void set_interval(double, double) noexcept {}
-  double largest_speed(double, double) const noexcept { return 0; }
+  double largest_relative_speed(const decant::FluidState<double>&, decant::Threads, decant::Reduction<double>&) const noexcept {
+    return 0;
+  }
   void sample(const decant::ConstPointsView<double>&, double, decant::Threads,
               decant::WallState<double>&) const noexcept {}
   bool separated(const decant::Vector3<double>&, const decant::Vector3<double>&, const decant::WallContact<double>*,

@@ -49,8 +49,9 @@ struct GuardReport {
 ///
 /// In the frame loop; these may not throw, and allocate only while the number of particles grows:
 /// set_interval(time [s], time_step [s]): bodies go from their poses at `time` to those at time + time_step; with a
-/// time_step of 0 they stand. sample, separated and guard are about this interval.
-/// largest_speed(time, time_step) [m/s]: of any point of any body over that time; keeps sub-steps short.
+/// time_step of 0 they stand. The four below are about this interval.
+/// largest_relative_speed(fluid, threads, reduction) [m/s]: of any particle past any body near it over the interval, or
+/// in the world where nothing moves; NaN if any velocity is. Keeps sub-steps short.
 /// sample(position, spacing [m], threads, walls): sizes and fills every array of `walls`, for bodies at the interval's
 /// start. Where no wall is felt share, gradient, flux and contact_count are 0 and distance is how far walls are felt;
 /// distance may be off by a tenth. share and gradient have to be a function and its derivative, or still water will not
@@ -68,7 +69,8 @@ concept Boundary =
              Threads threads, BodyId body, const ConstPointsView<typename B::Scalar>& position,
              const Vector3<typename B::Scalar>& x, const WallContact<typename B::Scalar>* contacts, int count,
              WallState<typename B::Scalar>& walls, const WallState<typename B::Scalar>& sampled,
-             FluidState<typename B::Scalar>& fluid) {
+             FluidState<typename B::Scalar>& fluid, const FluidState<typename B::Scalar>& sampled_fluid,
+             Reduction<double>& reduction) {
       requires std::same_as<typename B::Scalar, typename Kernel::Scalar>;
       { bodies.template add<Kernel>(name, shape, motion, slip, number, number, threads) } -> std::same_as<BodyId>;
       { built.size() } noexcept -> std::convertible_to<std::size_t>;
@@ -77,7 +79,7 @@ concept Boundary =
       bodies.set_motion(body, motion);
       { built.push_out(body, number, fluid) } -> std::same_as<Index>;
       { bodies.set_interval(number, number) } noexcept -> std::same_as<void>;
-      { built.largest_speed(number, number) } noexcept -> std::same_as<double>;
+      { built.largest_relative_speed(sampled_fluid, threads, reduction) } noexcept -> std::same_as<double>;
       { built.sample(position, number, threads, walls) } noexcept -> std::same_as<void>;
       { built.separated(x, x, contacts, count) } noexcept -> std::same_as<bool>;
       { built.guard(position, number, number, threads, sampled, fluid) } noexcept -> std::same_as<GuardReport>;

@@ -115,7 +115,8 @@ class RigidBodies {
   /// Largest speed of any particle relative to any body, at the body's point that is nearest to the particle within its
   /// bounds, over the current interval; relative to the world if nothing moves or there is no body [m/s]. NaN if any
   /// velocity is.
-  double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads, Reduction<double>& reduction) const {
+  double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads,
+                                Reduction<double>& reduction) const noexcept {
     const bool all_move = !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), moves);
     return reduction.over(
         fluid.size(), threads, 0.0,
