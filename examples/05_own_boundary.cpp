@@ -49,12 +49,14 @@ struct Flask {
       const double slope = near ? wall_.slope(distance) / from_center : 0;
       walls.share[i] = near ? static_cast<float>(wall_.share(distance)) : 0;
       walls.gradient.col(i) = static_cast<float>(slope) * position.col(i);  // outward: into the wall
+      const decant::Vector3<float> outward = position.col(i) / static_cast<float>(from_center + 1e-12);
+      const decant::Vector3<float> pull = static_cast<float>(slope * from_center * distance) * outward;
+      walls.moment.col(i) << pull.x() * outward, pull.y() * outward.tail<2>(), pull.z() * outward.z();
       walls.flux[i] = 0;
       walls.distance[i] = static_cast<float>(std::min(distance, wall_.reach()));
       walls.contact_count[i] = near ? 1 : 0;
       *walls.contacts_of(i) = {};  // a wall without friction, at rest
       walls.contacts_of(i)->gradient = walls.gradient.col(i);
-      walls.contacts_of(i)->distance = static_cast<float>(distance);
     });
   }
 

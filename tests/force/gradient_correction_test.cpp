@@ -134,8 +134,8 @@ TEST_CASE("GradientCorrection: beside a wall the divergence of flow along and to
     const double height = places(2, i);
     auto& contact = *liquid.walls.contacts_of(i);
     liquid.walls.contact_count[i] = height < wall.reach() ? 1 : 0;
-    contact.distance = height;
     contact.gradient = Vector3<double>(0, 0, -wall.slope(height));
+    liquid.walls.moment(5, i) = wall.slope(height) * height;
   }
   liquid.correction.compute(liquid.view());
   Matrix flow = Matrix::Zero();

@@ -53,7 +53,7 @@ struct GuardReport {
 /// largest_relative_speed(fluid, threads, reduction) [m/s]: of any particle past any body near it over the interval, or
 /// in the world where nothing moves; NaN if any velocity is. Keeps sub-steps short.
 /// sample(position, spacing [m], threads, walls): sizes and fills every array of `walls`, for bodies at the interval's
-/// start. Where no wall is felt share, gradient, flux and contact_count are 0 and distance is how far walls are felt;
+/// start. Where no wall is felt share, gradient, moment, flux and contact_count are 0 and distance is how far walls are felt;
 /// distance may be off by a tenth. share and gradient have to be a function and its derivative, or still water will not
 /// stay still; WallFunction has a pair for plane walls.
 /// separated(a, b, contacts, count): whether a wall stands between two points, of which one has these contacts. Called

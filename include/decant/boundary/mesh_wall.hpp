@@ -26,6 +26,7 @@ namespace decant {
 /// closed form, so only directions are summed:
 ///   share    = int du G(t),     G(t) = int_t^R w s^2 ds   = (share_plane(t) + t slope_plane(t)) / 2 pi
 ///   gradient = int du u K(t),   K(t) = -int_t^R w' s^2 ds = t^2 w(t) + slope_plane(t) / pi
+///   moment   = int du K(t) t (u.n)^2 n n^T,   n the surface's normal where the ray meets it
 /// A surface hides what is behind it whatever its thickness and orientation, which makes thin walls and small defects
 /// harmless; corners and curved walls need no special case.
 /// Immutable after construction and shared between simulations; refers to the hierarchy, which it does not own.
@@ -71,7 +72,7 @@ class MeshWall {
     if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
       return sample_directly(x, result);  // the surface passes through this cell: its corners see different sides
     }
-    Eigen::Matrix<double, 5, 1> mean = Eigen::Matrix<double, 5, 1>::Zero();
+    NodeValues mean = NodeValues::Zero();
     for (int corner = 0; corner < 8; ++corner) {
       const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
       const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
@@ -80,6 +81,8 @@ class MeshWall {
     result.share = plane_.share(mean[0]);
     result.gradient = plane_.slope(mean[0]) * mean.segment<3>(1);
     result.distance = mean[4];
+    const NodeValues scaled = plane_.slope(mean[0]) * mean;
+    result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
     return result.share > 0;
   }
 
@@ -92,6 +95,7 @@ class MeshWall {
     result.distance = nearest->distance;
     result.share = 0;
     result.gradient.setZero();
+    result.moment.setZero();
     for (const Vector3<double>& direction : directions()) {
       const auto hit = surface_->first_hit(x, x + reach() * direction);
       if (!hit) {
@@ -99,11 +103,15 @@ class MeshWall {
       }
       const double t = hit->fraction * reach();
       result.share += (plane_.share(t) + t * plane_.slope(t)) / (2 * pi);
-      result.gradient += direction * (t * plane_.radius_times_weight(t) + plane_.slope(t) / pi);
+      const double pull = t * plane_.radius_times_weight(t) + plane_.slope(t) / pi;
+      const double facing = direction.dot(hit->normal);
+      result.gradient += pull * direction;
+      result.moment += pull * t * facing * facing * hit->normal * hit->normal.transpose();
     }
     const double solid_angle = 4 * pi / static_cast<double>(direction_count);
     result.share *= solid_angle;
     result.gradient *= solid_angle;
+    result.moment *= solid_angle;
     return result.share > 0;
   }
 
@@ -114,11 +122,13 @@ class MeshWall {
   static constexpr int block_nodes = block_cells + 1;
 
   /// Eight cells a side; border nodes are stored in both blocks, so that a look-up stays within one.
-  /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, and the
-  /// true distance. Near a plane all of these are linear or constant in space, so interpolation is exact there, although
+  /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, the true
+  /// distance, and the moment over that slope (xx, xy, xz, yy, yz, zz). Near a plane all of these are linear or constant in space, so interpolation is exact there, although
   /// the share itself is steep.
+  using NodeValues = Eigen::Matrix<double, 11, 1>;
+  using StoredValues = Eigen::Matrix<float, 11, 1>;
   struct Block {
-    std::array<Eigen::Matrix<float, 5, 1>, block_nodes * block_nodes * block_nodes> value;
+    std::array<StoredValues, block_nodes * block_nodes * block_nodes> value;
     std::bitset<block_cells * block_cells * block_cells> crossed;
   };
 
@@ -190,8 +200,8 @@ class MeshWall {
 
   double spacing_of_cell() const noexcept { return cell_ * cells_per_spacing; }
 
-  Eigen::Matrix<float, 5, 1> node_at(const Vector3<double>& x) const noexcept {
-    Eigen::Matrix<double, 5, 1> node = Eigen::Matrix<double, 5, 1>::Zero();
+  StoredValues node_at(const Vector3<double>& x) const noexcept {
+    NodeValues node = NodeValues::Zero();
     node[0] = node[4] = 2 * reach();
     WallSample sample;
     const bool near = sample_directly(x, sample);
@@ -201,13 +211,20 @@ class MeshWall {
       node[0] = distance;
       node.segment<3>(1) = sample.gradient / plane_.slope(distance);
       node[4] = sample.distance;
+      set_moment(node, sample.moment / plane_.slope(distance));
     } else if (const auto nearest = surface_->closest_point(x, 2 * reach())) {
       node[0] = node[4] = nearest->distance;
       if (nearest->distance > 0) {
-        node.segment<3>(1) = (nearest->point - x) / nearest->distance;
+        const Vector3<double> toward = (nearest->point - x) / nearest->distance;
+        node.segment<3>(1) = toward;
+        set_moment(node, nearest->distance * toward * toward.transpose());
       }
     }
     return node.cast<float>();
+  }
+
+  static void set_moment(NodeValues& node, const Eigen::Matrix3d& moment) noexcept {
+    node.tail<6>() << moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2);
   }
 
   void fill(Block& block, const Vector3<double>& corner) const noexcept {

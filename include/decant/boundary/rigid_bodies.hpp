@@ -213,6 +213,7 @@ class RigidBodies {
     double amount = 0;
     double distance = 0;
     Vector3<double> gradient = Vector3<double>::Zero();
+    Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
     Vector3<double> normal = Vector3<double>::Zero();
     Vector3<double> point = Vector3<double>::Zero();
   };
@@ -247,6 +248,8 @@ class RigidBodies {
       share.amount = sample.share;
       share.distance = sample.distance;
       share.gradient = body.before.rotation * sample.gradient;
+      const Eigen::Matrix3d turn = body.before.rotation.toRotationMatrix();
+      share.moment = turn * sample.moment * turn.transpose();
       const double steepness = share.gradient.norm();
       if (steepness > 0) {
         share.normal = -share.gradient / steepness;
@@ -270,6 +273,7 @@ class RigidBodies {
                double spacing, WallState<Scalar>& walls) const noexcept {
     double amount = 0, flux = 0;
     Vector3<double> gradient = Vector3<double>::Zero();
+    Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
     WallContact<Scalar>* contacts = walls.contacts_of(i);
     for (std::size_t k = 0; k < count; ++k) {
       double weight = 1;
@@ -279,15 +283,16 @@ class RigidBodies {
       }
       const Body& body = bodies_[near[k].body];
       const Vector3<double> share = weight * near[k].gradient;
-      const Vector3<double> velocity = body.velocity.at(near[k].point);
+      // at the particle: liquid that turns with its vessel feels no friction, though the wall, farther out, is faster
+      const Vector3<double> velocity = body.velocity.at(near[k].point + near[k].distance * near[k].normal);
       amount += weight * near[k].amount;
       gradient += share;
+      moment += weight * near[k].moment;
       flux += share.dot(velocity);
       WallContact<Scalar>& contact = contacts[k];
       contact.body = near[k].body;
       contact.gradient = share.template cast<Scalar>();
       contact.velocity = velocity.template cast<Scalar>();
-      contact.distance = static_cast<Scalar>(near[k].distance);
       // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own layer
       // and the quotient would only measure rounding.
       const double distance = std::max(near[k].distance, 0.25 * spacing);
@@ -297,6 +302,12 @@ class RigidBodies {
     }
     walls.share[i] = static_cast<Scalar>(amount);
     walls.gradient.col(i) = gradient.template cast<Scalar>();
+    Eigen::Index entry = 0;
+    for (Eigen::Index row = 0; row < 3; ++row) {
+      for (Eigen::Index column = row; column < 3; ++column) {
+        walls.moment(entry++, i) = static_cast<Scalar>(moment(row, column));
+      }
+    }
     walls.flux[i] = static_cast<Scalar>(flux);
     walls.distance[i] = static_cast<Scalar>(count > 0 ? near[0].distance : reach);
     walls.contact_count[i] = static_cast<std::uint8_t>(count);

@@ -73,6 +73,11 @@ class SampledWall {
     result.share = fraction;
     result.gradient = gradient;
     result.distance = nearest ? nearest->distance : support_;
+    const double steepness = gradient.norm();
+    result.moment.setZero();
+    if (steepness > 0) {  // as if all of it were one plane
+      result.moment = result.distance / steepness * gradient * gradient.transpose();
+    }
     return true;
   }
 

@@ -145,6 +145,7 @@ class SolidParts {
     }
     result.share = 0;
     result.gradient.setZero();
+    result.moment.setZero();
     for (std::size_t k = 0; k < count; ++k) {
       // a part that does not stand out of a nearer part's plane is hidden behind it, or continues it
       double weight = 1;
@@ -153,7 +154,9 @@ class SolidParts {
         weight *= std::clamp(ahead / blend_, 0.0, 1.0);
       }
       result.share += weight * plane_.share(near[k].distance);
-      result.gradient -= near[k].normal * (weight * plane_.slope(near[k].distance));
+      const double slope = weight * plane_.slope(near[k].distance);
+      result.gradient -= slope * near[k].normal;
+      result.moment += slope * std::max(near[k].distance, 0.0) * near[k].normal * near[k].normal.transpose();
     }
     result.distance = std::max(near[0].distance, 0.0);
     return true;

@@ -12,6 +12,9 @@ namespace decant {
 struct WallSample {
   double share = 0;                                     ///< added to the density, over rest density [-]
   Vector3<double> gradient = Vector3<double>::Zero();   ///< of the share, points into the wall [1/m]
+  /// Sum over its faces of |gradient| a n n^T, with a face's distance a and normal n; symmetric [-]. Says how liquid that
+  /// slides along the wall sees itself continued behind it (force/gradient_correction.hpp).
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
   double distance = 0;                                  ///< to the nearest point of the surface [m]
 };
 

@@ -16,10 +16,9 @@ namespace decant {
 template <class Scalar>
 struct WallContact {
   std::uint32_t body = 0;
-  Scalar distance = 0;                                   ///< of the particle to the wall [m]
   Scalar friction = 0;                                   ///< viscous rate per kinematic viscosity [1/m^2]; 0 for free slip
   Vector3<Scalar> gradient = Vector3<Scalar>::Zero();    ///< [1/m]
-  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();    ///< of the wall at the closest point [m/s]
+  Vector3<Scalar> velocity = Vector3<Scalar>::Zero();    ///< of the body, as if it reached to the particle [m/s]
 };
 
 /// Sampled at the particles' positions, once per step.
@@ -32,6 +31,7 @@ struct WallState {
 
   Growable<Scalar, 1> share;                             ///< N, added to the density, over rest density [-]
   Growable<Scalar, 3> gradient;                          ///< 3xN, of share [1/m]
+  Growable<Scalar, 6> moment;                            ///< 6xN, WallSample::moment: xx, xy, xz, yy, yz, zz [-]
   Growable<Scalar, 1> flux;                              ///< N, sum over bodies of gradient . wall velocity [1/s]
   Growable<Scalar, 1> distance;                          ///< N, to the nearest wall; at most the reach of walls [m]
   Growable<std::uint8_t, 1> contact_count;               ///< N
@@ -40,6 +40,7 @@ struct WallState {
   void resize(Index count) {
     share.set_count(count);
     gradient.set_count(count);
+    moment.set_count(count);
     flux.set_count(count);
     distance.set_count(count);
     contact_count.set_count(count);

@@ -28,7 +28,7 @@ struct ResidualViscosity {
   using Scalar = ScalarType;
   static constexpr bool uses_gradient_correction = true;
 
-  Scalar numerical_viscosity = Scalar(3e-4);  ///< nu [m^2/s], >= 0
+  Scalar numerical_viscosity = Scalar(6e-4);  ///< nu [m^2/s], >= 0
 
   template <class Step>
   void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {

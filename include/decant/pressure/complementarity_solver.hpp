@@ -24,8 +24,9 @@ struct ComplementarityReport {
 /// Finds P >= 0 for a PressureSystem such that
 ///   r = offset + dt^2 D(a(P)) <= 0,   and r = 0 wherever P > 0
 /// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients, with the
-/// diagonal as preconditioner, over the particles that are in contact (P > 0 or r > 0); every few steps, pressures that have
-/// become negative are set to zero, contacts are found anew and the directions start over.
+/// diagonal as preconditioner, over the particles that are in contact (P > 0 or r > 0). Where pressures have become
+/// negative or particles have come into contact, these are set to zero and those taken in every few steps, and the
+/// directions start over.
 template <class ScalarType>
 class ComplementaritySolver {
  public:
@@ -57,7 +58,8 @@ class ComplementaritySolver {
     const double rest_density = static_cast<double>(step.rest_density);
     const double allowed = mean_tolerance * rest_density * static_cast<double>(count);
     const double largest_allowed = largest_tolerance * rest_density;
-    smallest_slope_ = Scalar(1e-6) * squared_step * step.rest_density * step.rest_density / (step.spacing * step.spacing);
+    const Scalar steep = step.time_step * step.rest_density / step.spacing;
+    smallest_slope_ = Scalar(1e-6) * steep * steep;
     while (true) {
       Progress now = start(step, system, offset, term, squared_step);
       ++report.iterations;
@@ -75,7 +77,7 @@ class ComplementaritySolver {
         const Progress next = advance(step, system, term, static_cast<Scalar>(now.product / curvature), squared_step);
         const bool close = next.amiss <= allowed && next.largest <= largest_allowed;
         const bool enough = close || report.iterations >= most_iterations - 1;
-        if (enough || (next.negative && since_start >= steps_between_starts)) {
+        if (enough || ((next.negative || next.touched) && since_start >= steps_between_starts)) {
           report.error = next.amiss / (rest_density * static_cast<double>(count));
           report.converged = close;
           if (enough && next.negative) {
@@ -93,7 +95,9 @@ class ComplementaritySolver {
         parallel_for(count, step.threads, [&](Index i) {
           const auto own = static_cast<std::size_t>(i);
           // particles out of contact stay out until the next start
-          direction_[own] = direction_[own] != 0 ? preconditioned(system, squared_step, own) + keep * direction_[own] : Scalar(0);
+          if (direction_[own] != 0) {
+            direction_[own] = preconditioned(system, squared_step, own) + keep * direction_[own];
+          }
         });
         now = next;
       }
@@ -108,9 +112,11 @@ class ComplementaritySolver {
     double amiss = 0;       ///< sum over particles [kg/m^3]
     double largest = 0;     ///< of them
     bool negative = false;  ///< some pressure is
+    bool touched = false;   ///< some particle has come into contact
 
     static Progress both(const Progress& a, const Progress& b) noexcept {
-      return {a.product + b.product, a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative};
+      return {a.product + b.product, a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative,
+              a.touched || b.touched};
     }
     void add(Scalar amiss_here) noexcept {
       amiss += static_cast<double>(amiss_here);
@@ -200,7 +206,10 @@ class ComplementaritySolver {
                                       : std::max(left, std::min(-left, term[own] * slope)));
             partial.negative = partial.negative || term[own] < 0;
             if (direction_[own] != 0) {
-              partial.product += static_cast<double>(left) * static_cast<double>(preconditioned(system, squared_step, own));
+              const Scalar scaled = preconditioned(system, squared_step, own);
+              partial.product += static_cast<double>(left) * static_cast<double>(scaled);
+            } else {
+              partial.touched = partial.touched || left > 0;
             }
           }
           return partial;

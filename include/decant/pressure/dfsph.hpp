@@ -41,8 +41,8 @@ class Dfsph {
   Scalar density_tolerance = Scalar(1e-3);     ///< mean compression of the next positions over rest density [-], > 0
   Scalar divergence_tolerance = Scalar(1e-4);  ///< mean compression per sub-step of the velocities [-], > 0; ten times
                                                ///< looser, still water keeps falling through itself by what is allowed
-  Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
-  int most_iterations = 100;                   ///< of each solve, per sub-step
+  Scalar largest_tolerance = Scalar(3e-3);     ///< of either, for any single particle [-], > 0
+  int most_iterations = 200;                   ///< of each solve, per sub-step
 
   /// What is carried from step to step, to start the next solve from.
   struct Memory {
@@ -70,8 +70,8 @@ class Dfsph {
   Memory& memory() noexcept { return memory_; }
 
   /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
-  /// down) with the stiffness p / (rho d^2), and the sub-step integrates that explicitly. At 0.5 d / sqrt(p / rho) still
-  /// water stays still; at twice as much a column collapses into itself. Taken for twice the mean pressure, which is the
+  /// down) with the stiffness p / (rho d^2), and the sub-step integrates that explicitly. At 0.25 d / sqrt(p / rho) still
+  /// water stays still; at 0.35, a column of forty layers collapses into itself. Taken for twice the mean pressure, which is the
   /// largest of a liquid at rest.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
@@ -104,7 +104,7 @@ class Dfsph {
           dt * velocity_system_.density_rate(step.neighbors, velocity_.data(), i, true) -
           slack(step.fluid.density[i], step.rest_density, dt);
     });
-    const ComplementarityReport velocities = relax(step, velocity_system_, memory_.pressure_term, divergence_tolerance);
+    const ComplementarityReport velocities = relax(step, velocity_system_, memory_.pressure_term, divergence_tolerance, largest_tolerance);
     report.divergence_iterations += velocities.iterations;
     report.divergence_error = std::max(report.divergence_error, velocities.error);
     accelerate(step, velocity_system_);
@@ -115,7 +115,7 @@ class Dfsph {
 
     if (compute_density_changes(step)) {
       std::fill(impulse_.begin(), impulse_.end(), Scalar(0));
-      report.divergence_iterations += relax(step, place_system_, impulse_, density_tolerance).iterations;
+      report.divergence_iterations += relax(step, place_system_, impulse_, density_tolerance, collision_tolerance).iterations;
       accelerate(step, place_system_);
       compute_density_changes(step);
     }
@@ -127,7 +127,7 @@ class Dfsph {
       offset_[own] = std::min(step.fluid.density[i] - step.rest_density + change_[own], most_compression);
       memory_.shift_term[own] /= dt;
     });
-    const ComplementarityReport places = relax(step, place_system_, memory_.shift_term, density_tolerance);
+    const ComplementarityReport places = relax(step, place_system_, memory_.shift_term, density_tolerance, largest_tolerance);
     report.density_iterations += places.iterations;
     report.density_error = std::max(report.density_error, places.error);
     const Scalar farthest = largest_shift * step.spacing;
@@ -144,13 +144,13 @@ class Dfsph {
  private:
   enum class Flag : std::uint8_t { no, yes };  // vector<bool> shares bytes between threads
 
-  static constexpr double stability_share = 0.5;  ///< see largest_step
+  static constexpr double stability_share = 0.25;  ///< see largest_step
   static constexpr Scalar contact_room = Scalar(0.1), loose_room = Scalar(0.2);  ///< of rest density
   static constexpr Scalar largest_correction = Scalar(0.05);  ///< of rest density, per sub-step
   static constexpr Scalar largest_shift = Scalar(0.2);        ///< spacings, per sub-step
   /// Where particles meet in disorder at high speed, D sees little of it, and places alone would have to be moved so far
   /// that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
-  static constexpr Scalar collision_threshold = Scalar(0.02);
+  static constexpr Scalar collision_threshold = Scalar(0.02), collision_tolerance = Scalar(0.01);
   static constexpr Scalar closing_time = Scalar(0.05);                           ///< [s]
 
   void resize(Index count) {
@@ -215,9 +215,9 @@ class Dfsph {
 
   template <class Step>
   ComplementarityReport relax(const Step& step, PressureSystem<Scalar>& system, std::vector<Scalar>& term,
-                              Scalar tolerance) noexcept {
+                              Scalar tolerance, Scalar largest) noexcept {
     complementarity_.mean_tolerance = static_cast<double>(tolerance);
-    complementarity_.largest_tolerance = static_cast<double>(largest_tolerance);
+    complementarity_.largest_tolerance = static_cast<double>(largest);
     complementarity_.most_iterations = most_iterations;
     return complementarity_.solve(step, system, offset_, term);
   }

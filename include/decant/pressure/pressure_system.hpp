@@ -19,7 +19,7 @@ namespace decant {
 /// (boundary/wall_function.hpp),
 ///   a_i    = -sum_j m_j (P_i L_i + P_j L_j) grad W_ij - rho_0 P_i L_i grad s_i                acceleration  [m/s^2]
 ///   D_i(v) = sum_j m_j (v_i - v_j) . L_i grad W_ij + rho_0 sum_walls (L_i grad s_i) . (v_i - v_wall)
-/// with D a density rate [kg/(m^3 s)]. For equal masses -D is the adjoint of a: pressure takes as much energy out of the
+/// with D a density rate [kg/(m^3 s)]; of L_i grad s_i the part along grad s_i counts. For equal masses -D is the adjoint of a: pressure takes as much energy out of the
 /// liquid as the compression it removes. There are two such systems:
 ///   assemble()   L = 1: D is the exact derivative of the summed density;
 ///   correct()    L from GradientCorrection: D is the exact divergence of linear velocities, so shear meets no pressure
@@ -84,7 +84,7 @@ class PressureSystem {
       Vector3<Scalar> wall = Vector3<Scalar>::Zero();
       const auto* contacts = step.walls.contacts_of(i);
       for (int k = 0; k < step.walls.contact_count[i]; ++k) {
-        const Vector3<Scalar> gradient = step.correction.apply(i, contacts[k].gradient);
+        const Vector3<Scalar> gradient = step.correction.at_wall(i, contacts[k].gradient);
         wall += gradient;
         flux += gradient.dot(contacts[k].velocity);
       }

@@ -44,7 +44,7 @@ struct SimulatorSettings {
                                                     ///< 0 < .. <= 1
   double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
   int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
-  double numerical_viscosity = 0.3;                 ///< of ResidualViscosity, in units of d sqrt(g d): calms motion from
+  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity, in units of d sqrt(g d): calms motion from
                                                     ///< particle to particle and leaves the liquid's alone; >= 0
   Threads threads{};                                ///< 0: all
 };
@@ -316,7 +316,7 @@ class Simulator {
         if (contacts[k].body == body) {
           Vector3<Scalar> gradient = contacts[k].gradient;
           if constexpr (wants_correction<Solver>) {
-            gradient = correction_.apply(i, gradient);
+            gradient = correction_.at_wall(i, gradient);
           }
           total += push * gradient.template cast<double>();
         }

@@ -35,7 +35,8 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
     return walls;
   };
   const WallState<Scalar> walls = sampled(inside, 1);
-  const bool sized = walls.share.count() == count && walls.gradient.count() == count && walls.flux.count() == count &&
+  const bool sized = walls.share.count() == count && walls.gradient.count() == count && walls.moment.count() == count &&
+                     walls.flux.count() == count &&
                      walls.distance.count() == count && walls.contact_count.count() == count;
   if (!sized || count == 0) {
     return {{"every array has an entry per particle, and there are particles (1 if not)", 1, 0}};
@@ -43,7 +44,8 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
   // over which gradients are compared [1/m]
   const double steepest = std::max(static_cast<double>(walls.gradient.colwise().norm().maxCoeff()), 1e-30);
 
-  const bool finite = walls.share.allFinite() && walls.gradient.allFinite() && walls.flux.allFinite();
+  const bool finite = walls.share.allFinite() && walls.gradient.allFinite() && walls.moment.allFinite() &&
+                      walls.flux.allFinite();
   double touching = 0, not_zero = 0, not_the_sum = 0, moving = 0;
   for (Index i = 0; i < count; ++i) {
     Point sum = Point::Zero();
@@ -119,7 +121,7 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
 
   // 0.03: meshes and boundary particles, whose walls are looked up or sums over points, are off by 0.01
   return {
-      {"share, gradient and flux are finite (1 if not)", finite ? 0.0 : 1.0, 0},
+      {"share, gradient, moment and flux are finite (1 if not)", finite ? 0.0 : 1.0, 0},
       {"some place given is near a wall (1 if not)", touching > 0 ? 0.0 : 1.0, 0},
       {"without a contact share and gradient are zero (particles)", not_zero, 0},
       {"the gradient is the sum of the contacts', over the largest", not_the_sum, 1e-5},

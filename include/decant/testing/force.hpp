@@ -58,6 +58,7 @@ struct LooseLiquid {
     walls.resize(position.cols());
     walls.share.setZero();
     walls.gradient.setZero();
+    walls.moment.setZero();
     walls.flux.setZero();
     walls.distance.setConstant(static_cast<Scalar>(Kernel::support_factor) * smoothing_length);
     walls.contact_count.setZero();
