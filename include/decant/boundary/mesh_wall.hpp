@@ -79,9 +79,9 @@ class MeshWall {
       mean += weight * nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
     }
     result.share = plane_.share(mean[0]);
-    result.gradient = plane_.slope(mean[0]) * mean.segment<3>(1);
     result.distance = mean[4];
     const NodeValues scaled = plane_.slope(mean[0]) * mean;
+    result.gradient = scaled.segment<3>(1);
     result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
     return result.share > 0;
   }

@@ -31,7 +31,7 @@ struct PressureReport {
 /// new have a number beyond the old count. clear() forgets.
 /// search_margin [-]: neighbours are searched to the support radius times 1 + this.
 /// Nothing may throw; scratch memory grows with the number of particles only.
-/// Laws (decant/testing/pressure.hpp): still water stays still; momentum of a free drop is kept.
+/// Laws: still water stays still; momentum of a free drop is kept.
 template <class P, class Step>
 concept PressureSolver =
     requires(P& solver, const Step& step, PressureReport& report, std::span<const std::uint32_t> order) {

@@ -30,7 +30,7 @@ namespace decant {
 /// is exact for linear velocities (GradientCorrection): how the density sum changes when particles slide past each other
 /// is a matter of their places, and must not slow them down. With D' for both, a standing wave 20 particles long lost
 /// half of its amplitude in a period and a half and ran 6 % too fast; with D it keeps it for as long as we looked.
-/// Both start from the pressures of the sub-step before.
+/// Velocities and places start from what the sub-step before ended with, collisions from nothing.
 template <class ScalarType>
 class Dfsph {
  public:
@@ -71,8 +71,8 @@ class Dfsph {
 
   /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
   /// down) with the stiffness p / (rho d^2), and the sub-step integrates that explicitly. At 0.25 d / sqrt(p / rho) still
-  /// water stays still; at 0.35, a column of forty layers collapses into itself. Taken for twice the mean pressure, which is the
-  /// largest of a liquid at rest.
+  /// water stays still; at 0.35, a column of forty layers collapses into itself. Taken for twice the mean pressure, which
+  /// is the largest of a liquid at rest.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
     double total = 0;

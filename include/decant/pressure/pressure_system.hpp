@@ -99,6 +99,7 @@ class PressureSystem {
 
   /// Accelerations of all particles, in records of four numbers: x, y, z and one unused.
   const Scalar* accelerations() const noexcept { return records_.data(); }
+  /// For a solver that has summed them up itself.
   std::vector<Scalar>& accelerations_to_replace() noexcept { return records_; }
 
   /// Computes accelerations() from P, which has one entry per particle.
