@@ -127,3 +127,31 @@ TEST_CASE("a column does not drift in 10 s", "[slow]") {
   require_at_rest(reading, 0.01);
   CHECK(std::abs(reading.drift) < 0.1 * 0.01);
 }
+
+TEST_CASE("a column of eighty layers carries its own weight") {
+  // by what each layer may give way within the tolerance, such a column could fall at centimetres per second
+  const double spacing = 0.0025, side = width * spacing;
+  decant::SimulatorSettings settings;
+  settings.spacing = spacing;
+  settings.threads = {1};
+  decant::LiquidSimulator simulator(settings);
+  simulator.add_body("column", decant::BoxInside{{0, 0, 0}, {side, side, 1.5 * depth}, 2 * spacing, {}});
+  const auto places = decant_test::block<float>({0, 0, 0}, width, width, 80, spacing, 0.05);
+  simulator.add_particles(places, decant::PointArray<float>::Zero(3, places.cols()), 0);
+  int sub_steps = 0, iterations = 0;
+  for (int frame = 0; frame < 15; ++frame) {
+    const auto report = simulator.step(0.02);
+    CHECK(report.advanced());
+    const double mean_square = 2 * report.kinetic_energy / (settings.liquid.density * report.volume);
+    CHECK(mean_square < 0.05 * 0.05);  // unsupported, it reaches 0.2 m/s in the first frame
+    if (frame > 5) {
+      sub_steps += report.sub_steps;
+      iterations += report.divergence_iterations + report.density_iterations;
+    }
+  }
+  const auto& fluid = simulator.fluid();
+  const double center = decant_test::mean_over(fluid, [&](Index i) { return fluid.position(2, i); });
+  CHECK(center == Approx(0.5 * depth).margin(0.5 * spacing));
+  CHECK(fluid.density.maxCoeff() < 1.05F * static_cast<float>(settings.liquid.density));
+  CHECK(iterations < 20 * sub_steps);
+}

@@ -9,33 +9,17 @@
 #include <decant/testing/force.hpp>
 
 #include "catch.hpp"
+#include "pressure/matrix_of.hpp"
 
 using decant::ComplementaritySolver;
 using decant::Index;
 using decant::PressureSystem;
 using decant::Vector3;
+using decant_test::matrix_of;
 using namespace decant::testing;
 using Kernel = decant::CubicSpline<double>;
 
 namespace {
-
-/// -dt^2 dD_i / dP_j, column by column.
-template <class Step>
-Eigen::MatrixXd matrix_of(const Step& step, PressureSystem<double>& system) {
-  const Index n = step.fluid.size();
-  Eigen::MatrixXd matrix(n, n);
-  std::vector<double> unit(static_cast<std::size_t>(n), 0.0);
-  for (Index j = 0; j < n; ++j) {
-    unit[static_cast<std::size_t>(j)] = 1;
-    system.accelerate(step.neighbors, unit.data(), step.threads);
-    unit[static_cast<std::size_t>(j)] = 0;
-    for (Index i = 0; i < n; ++i) {
-      matrix(i, j) = -step.time_step * step.time_step *
-                     system.density_rate(step.neighbors, system.accelerations(), i, false);
-    }
-  }
-  return matrix;
-}
 
 /// Projected Gauss-Seidel, until nothing changes: slow, and nothing to go wrong.
 Eigen::VectorXd reference(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& offset) {
@@ -116,6 +100,7 @@ TEST_CASE("ComplementaritySolver: finds what projected Gauss-Seidel finds") {
     solver.most_iterations = 2000;
     for (const double start : {0.0, 1e-3}) {
       std::vector<double> term(offset.size(), start);
+      solver.begin_step();
       const auto report = solver.solve(step, *system, offset, term);
       CHECK(report.converged);
       const Eigen::Map<const Eigen::VectorXd> found(term.data(), step.fluid.size());

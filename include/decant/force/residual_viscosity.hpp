@@ -3,7 +3,9 @@
 
 /// Friction for what particles do and the liquid does not: motion too fine for the spacing to mean anything.
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -23,12 +25,18 @@ namespace decant {
 /// (k d)^2 less: the idea of limiting artificial viscosity by a linear reconstruction is from Frontiere, Raskin and Owen
 /// 2017, "CRKSPH" (J. Comput. Phys. 332). The force acts along the line between two particles, so linear and angular
 /// momentum are kept to rounding.
+/// Pressure p holds particles in place with the stiffness p / (rho_0 d^2), and the deeper the liquid the more jitter that
+/// makes: of a pair, nu is the mean of
+///   nu_i = max(numerical_viscosity, 0.2 d sqrt(p_i / rho_0)),   at most what an explicit sub-step stands.
+/// It acts after the pressure. Before it, the velocities by which particles are moved would still contain what pressure
+/// has just done to them: x'' = -w^2 x is then overshot beyond w dt = sqrt(2) where friction is strong, and never after it.
 template <class ScalarType>
 struct ResidualViscosity {
   using Scalar = ScalarType;
   static constexpr bool uses_gradient_correction = true;
+  static constexpr bool acts_after_pressure = true;
 
-  Scalar numerical_viscosity = Scalar(6e-4);  ///< nu [m^2/s], >= 0
+  Scalar numerical_viscosity = Scalar(6e-4);  ///< the least nu [m^2/s], >= 0; 0 switches all of it off
 
   template <class Step>
   void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {
@@ -38,9 +46,10 @@ struct ResidualViscosity {
     using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     compute_gradients(step);
+    compute_coefficients(step);
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(0.01) * h * h;
-    const Scalar factor = 10 * numerical_viscosity / step.rest_density;
+    const Scalar factor = 5 / step.rest_density;  // half of each one's nu
     const Scalar* mass = step.fluid.mass.data();
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
       const auto own = 4 * static_cast<std::size_t>(i);
@@ -57,7 +66,8 @@ struct ResidualViscosity {
                            (velocity_[own + 1] - other.y - half * along(1)) * pair.y +
                            (velocity_[own + 2] - other.z - half * along(2)) * pair.z;
         const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
-        const B push = gather(mass, pair.neighbor) * residual * slope / (pair.distance_squared + softening);
+        const B nu = viscosity_[static_cast<std::size_t>(i)] + gather(viscosity_.data(), pair.neighbor);
+        const B push = nu * gather(mass, pair.neighbor) * residual * slope / (pair.distance_squared + softening);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
@@ -66,18 +76,28 @@ struct ResidualViscosity {
     });
   }
 
-  /// Half of what an explicit step of the pair operator stands on a lattice (see Viscosity): the reconstruction feeds some
-  /// of the jitter back where particles are in disorder.
+  /// None: the viscosity gives way to the sub-step.
   template <class Step>
-  Scalar largest_step(const Step& step) const noexcept {
-    if (!(numerical_viscosity > 0)) {
-      return std::numeric_limits<Scalar>::infinity();
-    }
-    const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
-    return Scalar(0.375) * Scalar(0.3) / (numerical_viscosity * stiffness);
+  Scalar largest_step(const Step&) const noexcept {
+    return std::numeric_limits<Scalar>::infinity();
   }
 
  private:
+  static constexpr Scalar pressure_share = Scalar(0.2);
+
+  template <class Step>
+  void compute_coefficients(const Step& step) noexcept {
+    // three quarters of what an explicit step of the pair operator stands on a lattice, see Viscosity
+    const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
+    const Scalar most = Scalar(0.75) * Scalar(0.3) / (step.time_step * stiffness);
+    viscosity_.resize(static_cast<std::size_t>(step.fluid.size()));
+    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      const Scalar head = std::max(step.fluid.pressure[i], Scalar(0)) / step.rest_density;
+      viscosity_[static_cast<std::size_t>(i)] =
+          std::min(most, std::max(numerical_viscosity, pressure_share * step.spacing * std::sqrt(head)));
+    });
+  }
+
   /// Walls take part as liquid that moves with them along their normal.
   template <class Step>
   void compute_gradients(const Step& step) noexcept {
@@ -137,6 +157,7 @@ struct ResidualViscosity {
     });
   }
 
+  std::vector<Scalar> viscosity_{};                 ///< nu of each particle
   std::vector<Scalar> velocity_{};                  ///< records of four, the last one unused
   std::array<std::vector<Scalar>, 3> gradient_{};   ///< row by row of G, records of four
 };

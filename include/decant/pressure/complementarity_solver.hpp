@@ -10,6 +10,7 @@
 
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
+#include <decant/pressure/coarse_cells.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
 namespace decant {
@@ -23,10 +24,10 @@ struct ComplementarityReport {
 
 /// Finds P >= 0 for a PressureSystem such that
 ///   r = offset + dt^2 D(a(P)) <= 0,   and r = 0 wherever P > 0
-/// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients, with the
-/// diagonal as preconditioner, over the particles that are in contact (P > 0 or r > 0). Where pressures have become
-/// negative or particles have come into contact, these are set to zero and those taken in every few steps, and the
-/// directions start over.
+/// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients over the particles
+/// that are in contact (P > 0 or r > 0), preconditioned by the diagonal plus, where whole regions are amiss, CoarseCells.
+/// Where pressures have become negative or particles have come into contact, these are set to zero and those taken in
+/// every few steps, and the directions start over.
 template <class ScalarType>
 class ComplementaritySolver {
  public:
@@ -34,7 +35,13 @@ class ComplementaritySolver {
 
   double mean_tolerance = 1e-3;     ///< mean of what may be left amiss, over rest density [-], > 0
   double largest_tolerance = 3e-3;  ///< for any one particle [-], > 0
+  /// Of mean_tolerance, for what cells of particles are compressed as a whole: what is left in a region adds up over its
+  /// depth, and eighty layers that each give way by 1e-4 a sub-step fall through themselves.
+  double net_share = 0.3;
   int most_iterations = 100;        ///< >= 1
+
+  /// Forgets the places of particles; call once per sub-step, before the first solve.
+  void begin_step() noexcept { sorted_ = assembled_ = false; }
 
   /// @param offset N, [kg/m^3]. @param term N, P: start and result. Leaves the matching accelerations in the system.
   /// What is amiss at a particle: compression that is left, or pressure that pushes liquid apart (as far as it does).
@@ -43,9 +50,9 @@ class ComplementaritySolver {
                               std::vector<Scalar>& term) noexcept {
     const Index count = step.fluid.size();
     const auto n = static_cast<std::size_t>(count);
-    residual_.resize(n);
-    direction_.resize(n);
-    image_.resize(n);
+    for (auto* values : {&residual_, &direction_, &image_, &contact_}) {
+      values->resize(n);
+    }
     sum_.resize(4 * n);
     ComplementarityReport report;
     const Scalar squared_step = step.time_step * step.time_step;
@@ -55,51 +62,64 @@ class ComplementaritySolver {
       report.converged = true;
       return report;
     }
+    if (!sorted_) {
+      cells_.sort(step);
+      sorted_ = true;
+    }
     const double rest_density = static_cast<double>(step.rest_density);
     const double allowed = mean_tolerance * rest_density * static_cast<double>(count);
     const double largest_allowed = largest_tolerance * rest_density;
     const Scalar steep = step.time_step * step.rest_density / step.spacing;
     smallest_slope_ = Scalar(1e-6) * steep * steep;
+    const auto judge = [&](const Progress& progress) {
+      report.error = progress.amiss / (rest_density * static_cast<double>(count));
+      net_ = cells_.restrict(residual_, contact_, step.threads);
+      report.converged =
+          progress.amiss <= allowed && progress.largest <= largest_allowed && net_ <= net_share * allowed;
+      return report.converged;
+    };
     while (true) {
-      Progress now = start(step, system, offset, term, squared_step);
+      const Progress start = set_out(step, system, offset, term, squared_step);
       ++report.iterations;
-      report.error = now.amiss / (rest_density * static_cast<double>(count));
-      report.converged = now.amiss <= allowed && now.largest <= largest_allowed;
-      if (report.converged || report.iterations >= most_iterations) {
+      if (judge(start) || report.iterations >= most_iterations) {
         return report;
       }
+      const bool in_bulk = net_ > net_share * allowed;
+      if (in_bulk && !assembled_) {
+        cells_.assemble(step, system, contact_);
+        assembled_ = true;
+      }
+      double product = precondition(step, system, squared_step, in_bulk);
+      direction_.swap(image_);
       for (int since_start = 1;; ++since_start) {
         const double curvature = apply(step, system, squared_step);
         ++report.iterations;
-        if (!(curvature > 0) || !(now.product > 0) || !std::isfinite(curvature)) {
-          break;  // nothing in contact, or a state that is not finite
+        if (!(curvature > 0) || !(product > 0) || !std::isfinite(curvature)) {
+          // nothing that could be corrected is in contact, or the state is not finite
+          system.accelerate(step.neighbors, term.data(), step.threads);
+          return report;
         }
-        const Progress next = advance(step, system, term, static_cast<Scalar>(now.product / curvature), squared_step);
-        const bool close = next.amiss <= allowed && next.largest <= largest_allowed;
-        const bool enough = close || report.iterations >= most_iterations - 1;
-        if (enough || ((next.negative || next.touched) && since_start >= steps_between_starts)) {
-          report.error = next.amiss / (rest_density * static_cast<double>(count));
-          report.converged = close;
-          if (enough && next.negative) {
-            clip(step, term);
-            system.accelerate(step.neighbors, term.data(), step.threads);
-          } else if (enough) {
-            std::swap(sum_, system.accelerations_to_replace());
-          }
-          if (enough) {
-            return report;
-          }
+        const Progress now = advance(step, system, term, static_cast<Scalar>(product / curvature), squared_step);
+        const bool enough = judge(now) || report.iterations >= most_iterations - 1;
+        if (enough && now.negative) {
+          clip(step, term);
+          system.accelerate(step.neighbors, term.data(), step.threads);
+        } else if (enough) {
+          std::swap(sum_, system.accelerations_to_replace());
+        }
+        if (enough) {
+          return report;
+        }
+        if ((now.negative || now.touched) && since_start >= steps_between_starts) {
           break;
         }
-        const Scalar keep = static_cast<Scalar>(next.product / now.product);
+        const double next_product = precondition(step, system, squared_step, in_bulk);
+        const Scalar keep = static_cast<Scalar>(next_product / product);
+        product = next_product;
         parallel_for(count, step.threads, [&](Index i) {
           const auto own = static_cast<std::size_t>(i);
-          // particles out of contact stay out until the next start
-          if (direction_[own] != 0) {
-            direction_[own] = preconditioned(system, squared_step, own) + keep * direction_[own];
-          }
+          direction_[own] = image_[own] + keep * direction_[own];
         });
-        now = next;
       }
     }
   }
@@ -108,14 +128,13 @@ class ComplementaritySolver {
   static constexpr int steps_between_starts = 6;
 
   struct Progress {
-    double product = 0;     ///< residual . preconditioned residual, over the contacts
     double amiss = 0;       ///< sum over particles [kg/m^3]
     double largest = 0;     ///< of them
     bool negative = false;  ///< some pressure is
     bool touched = false;   ///< some particle has come into contact
 
     static Progress both(const Progress& a, const Progress& b) noexcept {
-      return {a.product + b.product, a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative,
+      return {a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative,
               a.touched || b.touched};
     }
     void add(Scalar amiss_here) noexcept {
@@ -124,10 +143,27 @@ class ComplementaritySolver {
     }
   };
 
-  Scalar preconditioned(const PressureSystem<Scalar>& system, Scalar squared_step, std::size_t own) const noexcept {
-    const Scalar slope = squared_step * system.diagonal()[own];
-    // a particle that feels neither neighbours nor walls has no slope to divide by
-    return slope > smallest_slope_ ? residual_[own] / slope : Scalar(0);
+  /// Puts into image_ what residual_ asks for, over the contacts. Returns residual . image.
+  template <class Step>
+  double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step, bool in_bulk) noexcept {
+    if (in_bulk) {
+      cells_.solve();
+    }
+    return reduction_of_sums_.over(
+        step.fluid.size(), step.threads, 0.0,
+        [&](Index begin, Index end) {
+          double partial = 0;
+          for (Index i = begin; i < end; ++i) {
+            const auto own = static_cast<std::size_t>(i);
+            const Scalar slope = squared_step * system.diagonal()[own];
+            // a particle that feels neither neighbours nor walls has no slope to divide by
+            const Scalar alone = slope > smallest_slope_ ? residual_[own] / slope : Scalar(0);
+            image_[own] = contact_[own] * (in_bulk ? alone + cells_.correction(own) : alone);
+            partial += static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
+          }
+          return partial;
+        },
+        [](double a, double b) { return a + b; });
   }
 
   template <class Step>
@@ -138,9 +174,9 @@ class ComplementaritySolver {
     });
   }
 
-  /// Clips pressures, finds residuals and contacts, and sets out along the preconditioned residual.
+  /// Clips pressures, finds residuals and contacts.
   template <class Step>
-  Progress start(const Step& step, PressureSystem<Scalar>& system, const std::vector<Scalar>& offset,
+  Progress set_out(const Step& step, PressureSystem<Scalar>& system, const std::vector<Scalar>& offset,
                  std::vector<Scalar>& term, Scalar squared_step) noexcept {
     const Index count = step.fluid.size();
     clip(step, term);
@@ -156,9 +192,7 @@ class ComplementaritySolver {
             const Scalar slope = squared_step * system.diagonal()[own];
             residual_[own] = left;
             partial.add(std::max(left, std::min(-left, term[own] * slope)));
-            const bool contact = term[own] > 0 || left > 0;
-            direction_[own] = contact ? preconditioned(system, squared_step, own) : Scalar(0);
-            partial.product += static_cast<double>(left) * static_cast<double>(direction_[own]);
+            contact_[own] = term[own] > 0 || left > 0 ? Scalar(1) : Scalar(0);
             for (std::size_t axis = 0; axis < 4; ++axis) {
               sum_[4 * own + axis] = system.accelerations()[4 * own + axis];
             }
@@ -205,12 +239,8 @@ class ComplementaritySolver {
             partial.add(term[own] < 0 ? std::max(left, Scalar(0)) - term[own] * slope
                                       : std::max(left, std::min(-left, term[own] * slope)));
             partial.negative = partial.negative || term[own] < 0;
-            if (direction_[own] != 0) {
-              const Scalar scaled = preconditioned(system, squared_step, own);
-              partial.product += static_cast<double>(left) * static_cast<double>(scaled);
-            } else {
-              partial.touched = partial.touched || left > 0;
-            }
+            // particles out of contact stay out until the next start
+            partial.touched = partial.touched || (contact_[own] == 0 && left > 0);
           }
           return partial;
         },
@@ -218,7 +248,11 @@ class ComplementaritySolver {
   }
 
   Scalar smallest_slope_ = 0;
+  CoarseCells<Scalar> cells_{};
+  bool sorted_ = false, assembled_ = false;
+  double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
+  std::vector<Scalar> contact_{};  ///< 1 or 0
   std::vector<Scalar> sum_{};  ///< accelerations by `term`, records of four
   Reduction<Progress> reduction_{};
   Reduction<double> reduction_of_sums_{};

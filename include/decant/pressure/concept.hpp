@@ -25,6 +25,8 @@ struct PressureReport {
 /// solve(step, report): called when all other forces have been added to the velocities; adds those of pressure and may
 /// write step.shift, so that positions advanced by time_step * velocity + shift are where the liquid should be; writes
 /// fluid.pressure [Pa].
+/// correct_places(step, report), which a solver need not have: called when velocities are final, after forces that act
+/// after the pressure (see ForceTerm); for what then is left to correct by velocities or step.shift.
 /// largest_step(step) [s]: the solver's own limit on the sub-step (sound speed, for one), infinity if it has none.
 /// memory(): what the solver remembers from one sub-step to the next, a value that snapshots copy, with
 /// reorder(order): the particles were put into another order, place k now holds what was at order[k]; particles that are

@@ -125,6 +125,19 @@ class PressureSystem {
     });
   }
 
+  /// Calls f(j, x, y, z) with minus the acceleration of particle i by a unit of P_j, for its neighbours and itself.
+  template <class Neighbors, class Function>
+  void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
+    const Scalar* const push = corrected_ ? push_.data() : rate_.data();
+    const auto own = static_cast<std::size_t>(i);
+    const std::size_t first = list.first(i), count = static_cast<std::size_t>(list.count(i));
+    for (std::size_t k = 0; k < count; ++k) {
+      const Scalar* gradient = push + 3 * (first + k - k % width) + k % width;
+      f(static_cast<std::size_t>(list.index()[first + k]), gradient[0], gradient[width], gradient[2 * width]);
+    }
+    f(own, total_[4 * own], total_[4 * own + 1], total_[4 * own + 2]);
+  }
+
   /// D_i of one particle for vectors in records of four: velocities, or accelerations (then walls do not move).
   template <class Neighbors>
   [[gnu::always_inline]] Scalar density_rate(const Neighbors& list, const Scalar* records, Index i, bool walls_move) const noexcept {

@@ -44,8 +44,8 @@ struct SimulatorSettings {
                                                     ///< 0 < .. <= 1
   double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
   int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
-  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity, in units of d sqrt(g d): calms motion from
-                                                    ///< particle to particle and leaves the liquid's alone; >= 0
+  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity at the least, in units of d sqrt(g d): calms motion
+                                                    ///< from particle to particle and leaves the liquid's alone; >= 0
   Threads threads{};                                ///< 0: all
 };
 
@@ -103,7 +103,6 @@ class Simulator {
     validate(settings_);
     smoothing_length_ =
         settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
-    last_step_ = settings_.largest_step;
     configure_forces();
   }
 
@@ -276,7 +275,6 @@ class Simulator {
       fluid_.velocity *= Scalar(0.5);
     }
     fluid_.velocity.setZero();
-    solver_.memory().clear();
     inlets_.swap(inlets);
     bodies_ = std::move(moving);
     time_ = start;
@@ -332,7 +330,7 @@ class Simulator {
     FluidState<Scalar> fluid;
     typename Solver::Memory memory;
     Bodies bodies;
-    double time, last_step;
+    double time, longest_step;
     std::uint32_t next_id;
     Index lost;
     std::vector<std::pair<Inlet, Origin>> inlets;
@@ -340,7 +338,7 @@ class Simulator {
   };
 
   Snapshot snapshot() const {
-    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, last_step_, next_id_, lost_, inlets_,
+    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, longest_step_, next_id_, lost_, inlets_,
             watched_};
   }
 
@@ -349,7 +347,7 @@ class Simulator {
     solver_.memory() = snapshot.memory;
     bodies_ = snapshot.bodies;
     time_ = snapshot.time;
-    last_step_ = snapshot.last_step;
+    longest_step_ = snapshot.longest_step;
     next_id_ = snapshot.next_id;
     lost_ = snapshot.lost;
     inlets_ = snapshot.inlets;
@@ -357,11 +355,16 @@ class Simulator {
   }
 
  private:
+  /// Of a sub-step over the one before. While liquid bounces its pressure comes and goes, and the solver's limit with it.
+  static constexpr double largest_growth = 1.03;
+
   using InletWithOrigin = std::pair<Inlet, Origin>;
   using Watched = std::pair<BodyId, std::shared_ptr<const Cavity>>;
 
   template <class Part>
   static constexpr bool wants_correction = requires { requires Part::uses_gradient_correction; };
+  template <class Force>
+  static constexpr bool acts_after_pressure = requires { requires Force::acts_after_pressure; };
   static constexpr bool corrects_gradients =
       wants_correction<Solver> || []<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
         return (wants_correction<Terms> || ...);
@@ -432,6 +435,7 @@ class Simulator {
     if (!std::isfinite(speed)) {
       return 0;
     }
+    longest = std::min(longest, longest_step_ > 0 ? largest_growth * longest_step_ : first_step());
     if (speed > 0) {
       longest = std::min(longest, settings_.courant_number * settings_.spacing / speed);
     }
@@ -445,12 +449,25 @@ class Simulator {
     if (!(longest > 0) || left / longest > settings_.most_sub_steps - taken + 1) {
       return 0;
     }
+    longest_step_ = longest;
     return left / std::max(1.0, std::ceil(left / longest - 1e-9));
+  }
+
+  /// At first no solver knows how much pressure there will be: at most that of all liquid in one column.
+  double first_step() const noexcept {
+    const Vector3<double> weight = settings_.gravity;
+    double low = 0, high = 0;
+    for (Index i = 0; i < fluid_.size(); ++i) {
+      const double head = weight.dot(fluid_.position.col(i).template cast<double>());
+      low = i == 0 ? head : std::min(low, head);
+      high = i == 0 ? head : std::max(high, head);
+    }
+    const double head = high - low + weight.norm() * settings_.spacing;
+    return head > 0 ? 0.2 * settings_.spacing / std::sqrt(head) : settings_.largest_step;
   }
 
   /// @return whether the pressure solver converged.
   bool sub_step(double time_step, StepReport& report) noexcept {
-    last_step_ = time_step;
     bodies_.set_interval(time_, time_step);
     pour_in(time_step);
     find_neighbors();
@@ -464,12 +481,12 @@ class Simulator {
     shift_.set_count(fluid_.size());
     shift_.setZero();
     solver_.begin_step(step, pressure);
-    acceleration_.resize(3, fluid_.size());
-    acceleration_.setZero();
-    std::apply([&](auto&... terms) { (terms.accumulate(step, acceleration_), ...); }, forces_);
-    parallel_for(fluid_.size(), settings_.threads,
-                 [&](Index i) { fluid_.velocity.col(i) += step.time_step * acceleration_.col(i); });
+    apply_forces<false>(step);
     solver_.solve(step, pressure);
+    apply_forces<true>(step);
+    if constexpr (requires { solver_.correct_places(step, pressure); }) {
+      solver_.correct_places(step, pressure);
+    }
     advance(time_step, report);
 
     report.density_iterations += pressure.density_iterations;
@@ -477,6 +494,20 @@ class Simulator {
     report.density_error = std::max(report.density_error, pressure.density_error);
     report.divergence_error = std::max(report.divergence_error, pressure.divergence_error);
     return pressure.converged;
+  }
+
+  template <bool after_pressure>
+  void apply_forces(const Step& step) noexcept {
+    acceleration_.resize(3, fluid_.size());
+    acceleration_.setZero();
+    const auto apply = [&]<class Force>(Force& term) {
+      if constexpr (acts_after_pressure<Force> == after_pressure) {
+        term.accumulate(step, acceleration_);
+      }
+    };
+    std::apply([&](auto&... terms) { (apply(terms), ...); }, forces_);
+    parallel_for(fluid_.size(), settings_.threads,
+                 [&](Index i) { fluid_.velocity.col(i) += step.time_step * acceleration_.col(i); });
   }
 
   void pour_in(double time_step) noexcept {
@@ -592,7 +623,7 @@ class Simulator {
     kept_memory_ = solver_.memory();
     kept_inlets_ = inlets_;
     kept_time_ = time_;
-    kept_last_step_ = last_step_;
+    kept_longest_step_ = longest_step_;
     kept_next_id_ = next_id_;
   }
 
@@ -601,7 +632,7 @@ class Simulator {
     solver_.memory() = kept_memory_;
     inlets_ = kept_inlets_;
     time_ = kept_time_;
-    last_step_ = kept_last_step_;
+    longest_step_ = kept_longest_step_;
     next_id_ = kept_next_id_;
   }
 
@@ -668,7 +699,7 @@ class Simulator {
   WallState<Scalar> walls_{};
   GradientCorrection<Scalar> correction_{};
   double time_ = 0;
-  double last_step_ = 0;
+  double longest_step_ = 0;  ///< that the last sub-step could have been; 0 before the first
   std::uint32_t next_id_ = 0;
   Index lost_ = 0;
 
@@ -684,7 +715,7 @@ class Simulator {
   FluidState<Scalar> kept_fluid_{};
   typename Solver::Memory kept_memory_{};
   std::vector<InletWithOrigin> kept_inlets_{};
-  double kept_time_ = 0, kept_last_step_ = 0;
+  double kept_time_ = 0, kept_longest_step_ = 0;
   std::uint32_t kept_next_id_ = 0;
 };
 

@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A coarse level for pressure: what is the same all over a cell of some sixty particles, solved at once.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
+#include <decant/pressure/pressure_system.hpp>
+
+namespace decant {
+
+/// A sweep over neighbours carries information by one support radius, so that a deep column takes as many sweeps as it has
+/// layers. This finds in one go the best pressure that is constant within cells: with the matrix A of a PressureSystem and
+/// the indicator Z of the cells over the particles in contact,
+///   z = Z (Z^T A Z)^-1 Z^T r
+/// which is the coarse half of a two-level preconditioner (deflation: Nicolaides 1987, SIAM J. Numer. Anal. 24). Z^T A Z is
+/// the exact product, summed from what each particle feels of its cells, and factorized within its profile; there are at
+/// most some two thousand cells, which are made larger for more liquid.
+template <class ScalarType>
+class CoarseCells {
+ public:
+  using Scalar = ScalarType;
+
+  /// Sorts the particles of a sub-step into cells.
+  template <class Step>
+  void sort(const Step& step) {
+    const auto count = static_cast<std::size_t>(step.fluid.size());
+    number_cells(step);
+    begin_.assign(keys_.size() + 1, 0);
+    cell_.resize(count);
+    std::uint32_t cell = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (keys_[cell] != key_[i]) {
+        cell = static_cast<std::uint32_t>(std::lower_bound(keys_.begin(), keys_.end(), key_[i]) - keys_.begin());
+      }
+      cell_[i] = cell;
+      ++begin_[cell + 1];
+    }
+    for (std::size_t c = 1; c < begin_.size(); ++c) {
+      begin_[c] += begin_[c - 1];
+    }
+    member_.resize(count);
+    cursor_.assign(begin_.begin(), begin_.end());
+    for (std::size_t i = 0; i < count; ++i) {
+      member_[cursor_[cell_[i]]++] = static_cast<std::uint32_t>(i);
+    }
+    value_.assign(keys_.size(), 0.0);
+  }
+
+  std::size_t cells() const noexcept { return keys_.size(); }
+
+  /// Takes r: sums it over each cell's particles with contact[i] == 1 (else 0). @return sum over cells of what came out,
+  /// without its sign.
+  double restrict(const std::vector<Scalar>& residual, const std::vector<Scalar>& contact, Threads threads) noexcept {
+    const Index cells_per_range = 16;
+    parallel_ranges(static_cast<Index>(value_.size()), threads, cells_per_range, [&](Index begin, Index end) {
+      for (auto cell = static_cast<std::size_t>(begin); cell < static_cast<std::size_t>(end); ++cell) {
+        double total = 0;
+        for (std::uint32_t k = begin_[cell]; k < begin_[cell + 1]; ++k) {
+          total += static_cast<double>(contact[member_[k]] * residual[member_[k]]);
+        }
+        value_[cell] = total;
+      }
+    });
+    double sum = 0;
+    for (const double value : value_) {
+      sum += std::abs(value);
+    }
+    return sum;
+  }
+
+  /// Computes and factorizes Z^T A Z. After sort().
+  template <class Step>
+  void assemble(const Step& step, const PressureSystem<Scalar>& system, const std::vector<Scalar>& contact) {
+    felt_.resize(cell_.size());
+    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      Felt& felt = felt_[static_cast<std::size_t>(i)];
+      felt.count = 0;
+      int at = 0;
+      system.for_each_response(step.neighbors, i, [&](std::size_t j, Scalar x, Scalar y, Scalar z) {
+        // neighbours come in runs of one cell
+        if (at >= felt.count || felt.part[static_cast<std::size_t>(at)].cell != cell_[j]) {
+          at = felt.place_of(cell_[j]);
+        }
+        Part& part = felt.part[static_cast<std::size_t>(at)];
+        part.x += contact[j] * x;
+        part.y += contact[j] * y;
+        part.z += contact[j] * z;
+      });
+    });
+    lay_out_profile();
+    const double squared_step = static_cast<double>(step.time_step) * static_cast<double>(step.time_step);
+    for (const Felt& felt : felt_) {
+      for (std::size_t k = 0; k < static_cast<std::size_t>(felt.count); ++k) {
+        const Part& one = felt.part[k];
+        for (std::size_t l = 0; l <= k; ++l) {
+          const Part& other = felt.part[l];
+          entry(std::max(one.cell, other.cell), std::min(one.cell, other.cell)) +=
+              squared_step * static_cast<double>(one.x * other.x + one.y * other.y + one.z * other.z);
+        }
+      }
+    }
+    factorize();
+  }
+
+  /// Replaces what restrict() took by z, see correction(). After assemble().
+  void solve() noexcept {
+    const std::size_t cells = keys_.size();
+    for (std::size_t a = 0; a < cells; ++a) {
+      double value = value_[a];
+      for (std::size_t b = first_[a]; b < a; ++b) {
+        value -= entry(a, b) * value_[b];
+      }
+      value_[a] = value * entry(a, a);
+    }
+    for (std::size_t a = cells; a-- > 0;) {
+      value_[a] *= entry(a, a);
+      for (std::size_t b = first_[a]; b < a; ++b) {
+        value_[b] -= entry(a, b) * value_[a];
+      }
+    }
+  }
+
+  /// z of a particle in contact.
+  Scalar correction(std::size_t i) const noexcept { return static_cast<Scalar>(value_[cell_[i]]); }
+
+ private:
+  static constexpr std::size_t most_cells = 2000;
+  /// Over the support radius: a particle then feels no more than two cells along an axis.
+  static constexpr Scalar cell_width = Scalar(2.0001);
+  static constexpr std::size_t most_felt = 8;
+
+  /// Minus the acceleration of a particle by a unit of pressure in a cell.
+  struct Part {
+    std::uint32_t cell;
+    Scalar x, y, z;
+  };
+  struct Felt {
+    int count;
+    std::array<Part, most_felt> part;
+
+    int place_of(std::uint32_t cell) noexcept {
+      for (int k = 0; k < count; ++k) {
+        if (part[static_cast<std::size_t>(k)].cell == cell) {
+          return k;
+        }
+      }
+      // more than eight only at the seam of a periodic domain: joined with another, the preconditioner is less exact
+      if (count < static_cast<int>(most_felt)) {
+        part[static_cast<std::size_t>(count++)] = {cell, 0, 0, 0};
+      }
+      return count - 1;
+    }
+  };
+
+  /// Finds the cells that hold liquid, and in key_ the cell of each particle.
+  template <class Step>
+  void number_cells(const Step& step) {
+    const auto& position = step.fluid.position;
+    const Index count = step.fluid.size();
+    const Vector3<Scalar> low = position.rowwise().minCoeff();
+    const Vector3<Scalar> extent = position.rowwise().maxCoeff() - low;
+    // the longest axis counts most: cells that touch then have numbers close to each other, and the profile is small
+    std::array<Index, 3> axis{0, 1, 2};
+    std::sort(axis.begin(), axis.end(), [&](Index a, Index b) { return extent[a] > extent[b]; });
+    key_.resize(static_cast<std::size_t>(count));
+    Scalar width = cell_width * static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length;
+    while (true) {
+      const auto along = [&](Index a, Index i) {
+        const Scalar place = (position(a, i) - low[a]) / width;
+        constexpr auto most = Scalar(1 << 20);  // also for what is not a number
+        return place > 0 ? static_cast<std::uint64_t>(std::min(place, most)) : std::uint64_t{0};
+      };
+      keys_.clear();
+      for (Index i = 0; i < count; ++i) {
+        const std::uint64_t key = (along(axis[0], i) << 42) + (along(axis[1], i) << 21) + along(axis[2], i);
+        key_[static_cast<std::size_t>(i)] = key;
+        if (keys_.empty() || keys_.back() != key) {
+          keys_.push_back(key);
+        }
+      }
+      std::sort(keys_.begin(), keys_.end());
+      keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+      if (keys_.size() <= most_cells) {
+        return;
+      }
+      width *= 2;
+    }
+  }
+
+  /// The lower triangle, each row from its first entry that is not zero.
+  double& entry(std::size_t row, std::size_t column) noexcept { return matrix_[row_[row] + column]; }
+
+  void lay_out_profile() {
+    const std::size_t cells = keys_.size();
+    first_.resize(cells);
+    for (std::size_t c = 0; c < cells; ++c) {
+      first_[c] = static_cast<std::uint32_t>(c);
+    }
+    for (const Felt& felt : felt_) {
+      const auto end = felt.part.begin() + felt.count;
+      const auto lowest =
+          std::min_element(felt.part.begin(), end, [](const Part& a, const Part& b) { return a.cell < b.cell; });
+      for (auto part = felt.part.begin(); part != end; ++part) {
+        first_[part->cell] = std::min(first_[part->cell], lowest->cell);
+      }
+    }
+    row_.resize(cells);
+    std::size_t entries = 0;
+    for (std::size_t c = 0; c < cells; ++c) {
+      row_[c] = entries - first_[c];  // never negative: each row before has an entry
+      entries += c - first_[c] + 1;
+    }
+    matrix_.assign(entries, 0.0);
+  }
+
+  /// Cholesky in place; diagonal entries are left inverted.
+  void factorize() noexcept {
+    for (std::size_t a = 0; a < keys_.size(); ++a) {
+      const double whole = entry(a, a);
+      double rest = whole;
+      for (std::size_t b = first_[a]; b < a; ++b) {
+        double value = entry(a, b);
+        for (std::size_t k = std::max(first_[a], first_[b]); k < b; ++k) {
+          value -= entry(a, k) * entry(b, k);
+        }
+        value *= entry(b, b);
+        entry(a, b) = value;
+        rest -= value * value;
+      }
+      // a cell without contact, or one that says nothing new, takes no part
+      entry(a, a) = rest > 1e-6 * whole ? 1 / std::sqrt(rest) : 0;
+    }
+  }
+
+  std::vector<std::uint64_t> keys_{}, key_{};                   ///< of all cells, in order; of each particle's
+  std::vector<std::uint32_t> cell_{};                           ///< of each particle
+  std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};    ///< the particles of each cell
+  std::vector<Felt> felt_{};
+  std::vector<std::uint32_t> first_{};
+  std::vector<std::size_t> row_{};  ///< where column 0 of each row would be
+  std::vector<double> matrix_{}, value_{};
+};
+
+}  // namespace decant
