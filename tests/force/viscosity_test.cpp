@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <decant/force/viscosity.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include <decant/force/concept.hpp>
@@ -141,18 +142,16 @@ TEMPLATE_TEST_CASE("Walls that hold the liquid pull it along and never overshoot
     PointArray<Scalar> acceleration = PointArray<Scalar>::Zero(3, 1);
     force.accumulate(liquid.view(), acceleration);
     const double rate = nu * 1e4, dt = static_cast<double>(liquid.time_step);
-    const double fraction = rate * dt / (1 + rate * dt);  // of the slip that one step takes away
+    const double fraction = std::min(rate * dt, 1.0);  // of the slip that one step takes away
     CHECK(static_cast<double>(acceleration(0, 0)) * dt == Approx(-fraction).epsilon(1e-4));
     CHECK(static_cast<double>(acceleration(1, 0)) * dt == Approx(3 * fraction).epsilon(1e-4));
     CHECK(acceleration(2, 0) == 0);
   }
-  // Against a steady push the wall holds at the speed at which friction equals it, whatever the sub-step.
-  force.kinematic_viscosity = Scalar(1e-2);
-  liquid.fluid.velocity.col(0) = Vector3<Scalar>(Scalar(0.02), 3, 0);
-  PointArray<Scalar> acceleration = PointArray<Scalar>::Zero(3, 1);
-  acceleration(0, 0) = 2;
+  // What pushes the liquid does not change the pull: it may be gravity, which pressure will balance.
+  liquid.fluid.velocity.col(0) = Vector3<Scalar>(0, 3, 0);
+  PointArray<Scalar> acceleration = PointArray<Scalar>::Constant(3, 1, Scalar(2));
   force.accumulate(liquid.view(), acceleration);
-  CHECK(std::abs(static_cast<double>(acceleration(0, 0))) < 1e-4);
+  CHECK(acceleration == PointArray<Scalar>::Constant(3, 1, Scalar(2)));
   contact.friction = 0;
   acceleration.setZero();
   force.accumulate(liquid.view(), acceleration);

@@ -74,22 +74,18 @@ double profile_error(Drive drive, int across) {
 }  // namespace
 
 TEST_CASE("liquid that is pushed between plates takes the profile of Poiseuille") {
-  // 2.6, 0.8 and 0.7 %: on top of what shrinks with the spacing, particles in layers have 0.99 of the viscosity
   const double coarse = profile_error(Drive::push, 8), middle = profile_error(Drive::push, 16),
                fine = profile_error(Drive::push, 32);
   CAPTURE(coarse, middle, fine);
+  // 1.9, 0.7 and 0.7 %: what is left is not the spacing's but that particles in layers have 0.99 of the viscosity
   CHECK(coarse < 0.05);
   CHECK(middle < 0.5 * coarse);
-  CHECK(fine < middle);
+  CHECK(fine < 0.01);
 }
 
 TEST_CASE("liquid between plates of which one moves takes the profile of Couette") {
   // a line has nothing that a spacing could cut off: 0.1 % at each
-  const double coarse = profile_error(Drive::moving_lid, 8), middle = profile_error(Drive::moving_lid, 16),
-               fine = profile_error(Drive::moving_lid, 32);
-  CAPTURE(coarse, middle, fine);
-  CHECK(coarse < 0.05);
-  CHECK(middle < 0.05);
-  CHECK(fine < 0.05);
-  CHECK(fine < coarse);
+  CHECK(profile_error(Drive::moving_lid, 8) < 0.01);
+  CHECK(profile_error(Drive::moving_lid, 16) < 0.01);
+  CHECK(profile_error(Drive::moving_lid, 32) < 0.01);
 }

@@ -31,8 +31,9 @@ namespace decant {
 /// 1.23 nu for strain. The hat has 0.98 to 1.01 nu in layers, 1.06 and 0.94 nu on a lattice, and half to a quarter of
 /// the noise with which a disordered liquid answers shear.
 /// Walls that hold the liquid (WallContact::friction) pull with the rate nu * friction at its velocity along the wall,
-/// taken implicitly, with what terms before this one do during the sub-step: nothing overshoots however near the wall,
-/// and steady flow does not depend on the sub-step.
+/// and take at most all of that velocity in a sub-step: nothing overshoots however near the wall. An implicit pull,
+/// rate / (1 + rate dt), would let steady flow slip by rate dt; one that counts in the sub-step's other forces would
+/// hold up liquid at rest at upright walls, where pressure, which comes later, balances gravity.
 /// Explicit in time, hence only for thin liquids: beyond about 1e-2 m^2/s take ViscosityWeiler2018. A viscosity of zero
 /// costs nothing.
 template <class ScalarType>
@@ -110,6 +111,7 @@ struct Viscosity {
   template <class Step>
   void add_wall_friction(const Step& step, Index i, PointArray<Scalar>& acceleration) const noexcept {
     const WallContact<Scalar>* contacts = step.walls.contacts_of(i);
+    Vector3<Scalar> velocity = step.fluid.velocity.col(i);  // after the walls so far
     for (int k = 0; k < step.walls.contact_count[i]; ++k) {
       const WallContact<Scalar>& contact = contacts[k];
       const Scalar steepness = contact.gradient.norm();
@@ -117,9 +119,11 @@ struct Viscosity {
         continue;
       }
       const Vector3<Scalar> normal = contact.gradient / steepness;
-      const Vector3<Scalar> slip = step.fluid.velocity.col(i) + step.time_step * acceleration.col(i) - contact.velocity;
-      const Scalar rate = kinematic_viscosity * contact.friction;
-      acceleration.col(i) -= rate / (1 + rate * step.time_step) * (slip - slip.dot(normal) * normal);
+      const Vector3<Scalar> slip = velocity - contact.velocity;
+      const Scalar rate = std::min(kinematic_viscosity * contact.friction, 1 / step.time_step);
+      const Vector3<Scalar> pull = -rate * (slip - slip.dot(normal) * normal);
+      velocity += step.time_step * pull;
+      acceleration.col(i) += pull;
     }
   }
 
