@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs what is missing, builds everything and runs every test. Ends with the line `N passed, N failed`; the exit
+# Installs what is missing, builds everything and runs every test but those labelled `long` (a quarter of an hour). Ends with the line `N passed, N failed`; the exit
 # status is 0 only if there are tests and all of them passed.
 # Environment: DECANT_TEST_JOBS, how many compilers and tests run side by side (all cores unless given);
 # DECANT_SHARED_DATA_DIR, a folder of measurements that some tests compare with; DECANT_BUILD_DIR, build/ unless given;
 # CI=true makes warnings errors and builds the benchmarks, too.
-# Arguments go to ctest: ./tests/run.sh -LE slow
+# Arguments go to ctest instead: ./tests/run.sh -L long, ./tests/run.sh -LE 'slow|long'
 set -uo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
@@ -32,6 +32,9 @@ cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=
   -DDECANT_SHARED_DATA_DIR="$measurements" || give_up "Configuring failed."
 cmake --build "$build" --parallel "$jobs" || give_up "Building failed."
 
+if (($# == 0)); then
+  set -- --label-exclude '^long$'
+fi
 results=$build/test-results.xml
 rm -f "$results"
 ctest --test-dir "$build" --output-on-failure --no-tests=error --parallel "$jobs" --output-junit "$PWD/$results" "$@"

@@ -87,3 +87,29 @@ TEST_CASE("ResidualViscosity brakes long waves by the square of their wave numbe
   CHECK(shorter / longer > 10);
   CHECK(shorter / longer < 20);
 }
+
+TEST_CASE("ResidualViscosity grows with the square root of pressure, as far as the sub-step stands it") {
+  using Kernel = CubicSpline<double>;
+  auto liquid = loose_ball<Kernel>(0.005, 5, 0.2, 1.0);
+  const double head = 2.0;  // [m^2/s^2], 20 cm of water
+  const auto strength = [&](double least, double share, double pressure, double time_step) {
+    liquid.fluid.pressure.setConstant(pressure);
+    ResidualViscosity<double> force;
+    force.numerical_viscosity = least;
+    force.pressure_share = share;
+    auto step = liquid.view();
+    step.time_step = time_step;
+    PointArray<double> acceleration = PointArray<double>::Zero(3, liquid.fluid.size());
+    force.accumulate(step, acceleration);
+    return acceleration.norm();
+  };
+  const double rest_density = liquid.view().rest_density, nu = 0.2 * 0.005 * std::sqrt(head);
+  const double one = strength(nu, 0, 0, 1e-5);
+  CHECK(strength(0, 0.2, head * rest_density, 1e-5) == Approx(one));
+  CHECK(strength(0, 0.2, 4 * head * rest_density, 1e-5) == Approx(2 * one));
+  CHECK(strength(0.5 * nu, 0.2, -head * rest_density, 1e-5) == Approx(0.5 * one));
+  CHECK(strength(0, 0, head * rest_density, 1e-5) == 0);
+  const double most = strength(1e9, 0, 0, 0.01);
+  CHECK(strength(1e9, 0, 0, 0.02) == Approx(0.5 * most));
+  CHECK(strength(0, 0.2, 1e12, 0.02) == Approx(0.5 * most));
+}

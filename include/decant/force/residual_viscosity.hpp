@@ -27,7 +27,7 @@ namespace decant {
 /// momentum are kept to rounding.
 /// Pressure p holds particles in place with the stiffness p / (rho_0 d^2), and the deeper the liquid the more jitter that
 /// makes: of a pair, nu is the mean of
-///   nu_i = max(numerical_viscosity, 0.2 d sqrt(p_i / rho_0)),   at most what an explicit sub-step stands.
+///   nu_i = max(numerical_viscosity, pressure_share d sqrt(p_i / rho_0)),   at most what an explicit sub-step stands.
 /// It acts after the pressure. Before it, the velocities by which particles are moved would still contain what pressure
 /// has just done to them: x'' = -w^2 x is then overshot beyond w dt = sqrt(2) where friction is strong, and never after it.
 template <class ScalarType>
@@ -36,11 +36,12 @@ struct ResidualViscosity {
   static constexpr bool uses_gradient_correction = true;
   static constexpr bool acts_after_pressure = true;
 
-  Scalar numerical_viscosity = Scalar(6e-4);  ///< the least nu [m^2/s], >= 0; 0 switches all of it off
+  Scalar numerical_viscosity = Scalar(6e-4);  ///< the least nu [m^2/s], >= 0
+  Scalar pressure_share = Scalar(0.2);        ///< [-], >= 0
 
   template <class Step>
   void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {
-    if (!(numerical_viscosity > 0)) {
+    if (!(numerical_viscosity > 0) && !(pressure_share > 0)) {
       return;
     }
     using Kernel = typename Step::Kernel;
@@ -83,8 +84,6 @@ struct ResidualViscosity {
   }
 
  private:
-  static constexpr Scalar pressure_share = Scalar(0.2);
-
   template <class Step>
   void compute_coefficients(const Step& step) noexcept {
     // three quarters of what an explicit step of the pair operator stands on a lattice, see Viscosity

@@ -94,19 +94,35 @@ class CoarseCells {
         part.y += contact[j] * y;
         part.z += contact[j] * z;
       });
+      felt.sort();
     });
     lay_out_profile();
+    // neighbours in the list feel the same cells: what they add is gathered before it goes into the matrix
+    std::array<double, most_felt * most_felt> gathered{};
+    const Felt* group = nullptr;
     const double squared_step = static_cast<double>(step.time_step) * static_cast<double>(step.time_step);
+    const auto put_down = [&] {
+      for (std::size_t k = 0; group != nullptr && k < static_cast<std::size_t>(group->count); ++k) {
+        for (std::size_t l = 0; l <= k; ++l) {
+          entry(group->part[k].cell, group->part[l].cell) += squared_step * gathered[most_felt * k + l];
+        }
+      }
+      gathered.fill(0);
+    };
     for (const Felt& felt : felt_) {
+      if (group == nullptr || !felt.same_cells(*group)) {
+        put_down();
+        group = &felt;
+      }
       for (std::size_t k = 0; k < static_cast<std::size_t>(felt.count); ++k) {
         const Part& one = felt.part[k];
         for (std::size_t l = 0; l <= k; ++l) {
           const Part& other = felt.part[l];
-          entry(std::max(one.cell, other.cell), std::min(one.cell, other.cell)) +=
-              squared_step * static_cast<double>(one.x * other.x + one.y * other.y + one.z * other.z);
+          gathered[most_felt * k + l] += static_cast<double>(one.x * other.x + one.y * other.y + one.z * other.z);
         }
       }
     }
+    put_down();
     factorize();
   }
 
@@ -158,6 +174,16 @@ class CoarseCells {
       }
       return count - 1;
     }
+
+    /// By cell; there are few.
+    void sort() noexcept {
+      std::sort(part.begin(), part.begin() + count, [](const Part& a, const Part& b) { return a.cell < b.cell; });
+    }
+
+    bool same_cells(const Felt& other) const noexcept {
+      return count == other.count && std::equal(part.begin(), part.begin() + count, other.part.begin(),
+                                                [](const Part& a, const Part& b) { return a.cell == b.cell; });
+    }
   };
 
   /// Finds the cells that hold liquid, and in key_ the cell of each particle.
@@ -205,11 +231,9 @@ class CoarseCells {
       first_[c] = static_cast<std::uint32_t>(c);
     }
     for (const Felt& felt : felt_) {
-      const auto end = felt.part.begin() + felt.count;
-      const auto lowest =
-          std::min_element(felt.part.begin(), end, [](const Part& a, const Part& b) { return a.cell < b.cell; });
-      for (auto part = felt.part.begin(); part != end; ++part) {
-        first_[part->cell] = std::min(first_[part->cell], lowest->cell);
+      for (std::size_t k = 0; k < static_cast<std::size_t>(felt.count); ++k) {
+        std::uint32_t& first = first_[felt.part[k].cell];
+        first = std::min(first, felt.part[0].cell);
       }
     }
     row_.resize(cells);

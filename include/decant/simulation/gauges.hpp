@@ -10,6 +10,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -163,11 +164,8 @@ class Gauges {
     }
     flat_grid_.rebuild(flat_, column_radius * spacing_);
     columns_.clear();
-    for (Index i = 0; i < flat_.cols(); ++i) {
-      // a column's surface is at most some spacings below its highest particle
-      if (bulk_[static_cast<std::size_t>(i)].z() > highest - 4 * spacing_) {
-        columns_.push_back(column_at(i));
-      }
+    for (const Index i : highest_of_each_square(highest - 4 * spacing_)) {
+      columns_.push_back(column_at(i));
     }
     centers_.resize(3, static_cast<Index>(columns_.size()));
     for (std::size_t k = 0; k < columns_.size(); ++k) {
@@ -225,8 +223,34 @@ class Gauges {
     double height = 0;
   };
 
+  struct Square {
+    double x, y;
+    Index highest;
+  };
+
   // In spacings: wide and deep enough that counting particles measures a surface to a tenth of a spacing.
   static constexpr double column_radius = 2.5, slab_depth = 8, slab_below_top = 5, slope_reach = 3;
+
+  // Of the particles above `low` that share a square of a spacing across the axis, the highest stands for all.
+  const std::vector<Index>& highest_of_each_square(double low) {
+    squares_.clear();
+    for (Index i = 0; i < flat_.cols(); ++i) {
+      if (bulk_[static_cast<std::size_t>(i)].z() > low) {
+        squares_.push_back({std::floor(flat_(0, i) / spacing_), std::floor(flat_(1, i) / spacing_), i});
+      }
+    }
+    std::sort(squares_.begin(), squares_.end(), [&](const Square& a, const Square& b) {
+      const auto height = [&](const Square& s) { return bulk_[static_cast<std::size_t>(s.highest)].z(); };
+      return std::tuple(a.x, a.y, -height(a), a.highest) < std::tuple(b.x, b.y, -height(b), b.highest);
+    });
+    surface_.clear();
+    for (std::size_t k = 0; k < squares_.size(); ++k) {
+      if (k == 0 || squares_[k].x != squares_[k - 1].x || squares_[k].y != squares_[k - 1].y) {
+        surface_.push_back(squares_[k].highest);
+      }
+    }
+    return surface_;
+  }
 
   Column column_at(Index i) const {
     const Vector3<double>& own = bulk_[static_cast<std::size_t>(i)];
@@ -248,7 +272,8 @@ class Gauges {
     double above = 0, in_slab = 0;
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
     const auto add = [&](const Vector3<double>& x, double distance_squared) {
-      const double weight = std::pow(1 - distance_squared / (column_radius * column_radius * spacing_ * spacing_), 2);
+      const double left = 1 - distance_squared / (column_radius * column_radius * spacing_ * spacing_);
+      const double weight = left * left;
       // a particle on the border between slab and rest belongs to both by halves
       const double over = std::clamp((x.z() - slab_top) / spacing_ + 0.5, 0.0, 1.0);
       const double under = std::clamp((slab_bottom - x.z()) / spacing_ + 0.5, 0.0, 1.0);
@@ -349,6 +374,8 @@ class Gauges {
   bool pieces_known_ = false;
   std::vector<std::uint32_t> piece_, size_;
   std::vector<Vector3<double>> in_body_, bulk_;
+  std::vector<Square> squares_;
+  std::vector<Index> surface_;
   std::vector<Column> columns_;
   PointArray<double> flat_, centers_;
   CellGrid<double> flat_grid_{};

@@ -44,8 +44,9 @@ struct SimulatorSettings {
                                                     ///< 0 < .. <= 1
   double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
   int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
-  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity at the least, in units of d sqrt(g d): calms motion
-                                                    ///< from particle to particle and leaves the liquid's alone; >= 0
+  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity, in units of d sqrt(g d), and a third of it in
+                                                    ///< units of d sqrt(p / rho_0) where that is more: calms motion from
+                                                    ///< particle to particle and leaves the liquid's alone; >= 0
   Threads threads{};                                ///< 0: all
 };
 
@@ -385,6 +386,9 @@ class Simulator {
     if constexpr (requires { term.numerical_viscosity = Scalar(0); }) {
       term.numerical_viscosity = static_cast<Scalar>(settings_.numerical_viscosity * settings_.spacing *
                                                      std::sqrt(settings_.gravity.norm() * settings_.spacing));
+      if constexpr (requires { term.pressure_share = Scalar(0); }) {
+        term.pressure_share = static_cast<Scalar>(settings_.numerical_viscosity / 3);
+      }
     }
     if constexpr (requires { term.surface_tension = Scalar(0); }) {
       term.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
