@@ -4,16 +4,15 @@
 /// Internal friction of a thin liquid, and friction at walls that hold it.
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
+#include <decant/force/detail/viscous_pair.hpp>
 
 namespace decant {
 
@@ -56,10 +55,8 @@ struct Viscosity {
         velocity_[static_cast<std::size_t>(4 * i + axis)] = step.fluid.velocity(axis, i);
       }
     });
-    const Scalar support = static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length;
-    const Scalar per_support = 1 / support;
-    const Scalar least_squared = Scalar(1e-6) * support * support;  // particles at one place have no line between them
-    const Scalar factor = -strength(support) * kinematic_viscosity / step.rest_density;
+    const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length);
+    const Scalar factor = -kinematic_viscosity / step.rest_density;
     const Scalar* mass = step.fluid.mass.data();
     parallel_for(count, step.threads, [&](Index i) {
       const Scalar* own = &velocity_[static_cast<std::size_t>(4 * i)];
@@ -68,8 +65,7 @@ struct Viscosity {
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
         const auto other = gather3(velocity_.data(), pair.neighbor);
         const B approach = (own_x - other.x) * pair.x + (own_y - other.y) * pair.y + (own_z - other.z) * pair.z;
-        const B weight = maximum(1 - per_support * square_root(pair.distance_squared), B(Scalar(0)));
-        const B push = gather(mass, pair.neighbor) * approach * weight / (pair.distance_squared + least_squared);
+        const B push = gather(mass, pair.neighbor) * approach * weight(pair.distance_squared);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
@@ -84,30 +80,13 @@ struct Viscosity {
     if (!(kinematic_viscosity > 0)) {
       return std::numeric_limits<Scalar>::infinity();
     }
-    // Largest eigenvalue of the pair operator <= 2 * nu / 3 * sum_j V_j strength (1 - r / R); an explicit step is
-    // stable below 2 over it. Three quarters of that leave room for uneven particles: 0.13 d^2 / nu for support 2 d.
-    const Scalar support = static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length;
-    const Scalar volume = step.spacing * step.spacing * step.spacing;
-    const int reach = static_cast<int>(support / step.spacing);
-    Scalar total = 0;
-    for (int i = -reach; i <= reach; ++i) {
-      for (int j = -reach; j <= reach; ++j) {
-        for (int k = -reach; k <= reach; ++k) {
-          const Scalar r = step.spacing * std::sqrt(static_cast<Scalar>(i * i + j * j + k * k));
-          total += r > 0 ? std::max(1 - r / support, Scalar(0)) : Scalar(0);
-        }
-      }
-    }
-    return Scalar(0.75) * 3 / (kinematic_viscosity * strength(support) * volume * total);
+    // An explicit step is stable below 2 over the largest eigenvalue, 2 nu / 3 times this. Three quarters of that leave
+    // room for uneven particles: 0.13 d^2 / nu for support 2 d.
+    const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length);
+    return Scalar(0.75) * 3 / (kinematic_viscosity * weight.stiffness(step.spacing));
   }
 
  private:
-  /// 10 times the hat's -W' / r at r = 0 [1/m^5].
-  static Scalar strength(Scalar support) noexcept {
-    const Scalar squared = support * support;
-    return 225 * std::numbers::inv_pi_v<Scalar> / (squared * squared * support);
-  }
-
   template <class Step>
   void add_wall_friction(const Step& step, Index i, PointArray<Scalar>& acceleration) const noexcept {
     const WallContact<Scalar>* contacts = step.walls.contacts_of(i);

@@ -13,6 +13,7 @@
 #include <decant/core/growable.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
+#include <decant/force/detail/viscous_pair.hpp>
 
 namespace decant {
 
@@ -107,15 +108,14 @@ struct ViscosityWeiler2018 {
     record[2] = value[2];
   }
 
-  /// Per pair w = -10 nu dt / rho_0 * W'/r / (r^2 + 0.01 h^2) >= 0, so that the friction is dt a_i = -sum_j m_j w (v_ij .
-  /// x_ij) x_ij; it is the same for all iterations. Positions come with the list.
+  /// Per pair w = nu dt / rho_0 * ViscousPair >= 0, so that the friction is dt a_i = -sum_j m_j w (v_ij . x_ij) x_ij; it is
+  /// the same for all iterations. Positions come with the list.
   template <class Step>
   void assemble(const Step& step) noexcept {
     using Kernel = typename Step::Kernel;
     const Index count = step.fluid.size();
-    const Scalar h = step.smoothing_length;
-    const Scalar softening = Scalar(0.01) * h * h;
-    const Scalar factor = -10 * kinematic_viscosity * step.time_step / step.rest_density;
+    const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length);
+    const Scalar factor = kinematic_viscosity * step.time_step / step.rest_density;
     const Scalar* mass = step.fluid.mass.data();
     if (weight_.size() < step.neighbors.index_size()) {
       weight_.resize(step.neighbors.index_size());
@@ -126,10 +126,8 @@ struct ViscosityWeiler2018 {
     image_.set_count(count);
     parallel_for(count, step.threads, [&](Index i) {
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B weight = factor * gather(mass, pair.neighbor) *
-                         Kernel::derivative_over_radius(square_root(pair.distance_squared), h) /
-                         (pair.distance_squared + softening);
-        weight.store(&weight_[pair.slot]);
+        const B shared = factor * gather(mass, pair.neighbor) * weight(pair.distance_squared);
+        shared.store(&weight_[pair.slot]);
       });
     });
   }

@@ -22,7 +22,7 @@ namespace decant {
 /// constraints, on the velocity's divergence and on the density. Each is a linear complementarity problem: pressure >= 0
 /// where there is contact, compression <= 0 where there is none.
 ///   velocities:  dt D(v) <= max(rho_0 - rho, 0)      pressure acts on velocities
-///   collisions:  dt D'(v) <= max(rho_0 - rho, 0) + 2 % of rho_0, likewise, where particles meet at high speed
+///   collisions:  dt D'(v) <= max(1.02 rho_0 - rho, 0), likewise, where particles meet at high speed or are too dense
 ///   places:      rho + dt D'(v) + D'(shift) <= rho_0   what is too dense moves apart, without gaining speed
 /// Where we differ: the paper adds the density correction to the velocities, which throws liquid that starts a little too
 /// dense into the air and keeps still water simmering; it forbids liquid below rest density to contract; and it takes one

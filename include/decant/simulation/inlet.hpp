@@ -68,19 +68,22 @@ class Inlet {
     return table.back().second;
   }
 
+  /// Of the liquid that comes in [m/s].
+  double speed(double time) const noexcept { return flow(time) / (static_cast<double>(layer_.size()) * spacing_ * spacing_); }
+
   /// Lets time pass; calls emit(position, velocity) for each particle that has come in meanwhile.
   template <class Emit>
   void advance(double time, double time_step, Emit&& emit) {
     const double rate = flow(time + 0.5 * time_step);
     const double layer_volume = static_cast<double>(layer_.size()) * spacing_ * spacing_ * spacing_;
     pending_ += rate * time_step;
-    const double speed = rate / (layer_volume / spacing_);
+    const double fast = speed(time + 0.5 * time_step);
     while (pending_ >= layer_volume) {
       pending_ -= layer_volume;
       // the layer passed the opening a moment ago
-      const double travelled = rate > 0 ? speed * pending_ / rate : 0;
+      const double travelled = rate > 0 ? fast * pending_ / rate : 0;
       for (const Vector3<double>& place : layer_) {
-        emit(Vector3<double>(place + travelled * settings_.direction), Vector3<double>(speed * settings_.direction));
+        emit(Vector3<double>(place + travelled * settings_.direction), Vector3<double>(fast * settings_.direction));
       }
     }
   }

@@ -435,7 +435,10 @@ class Simulator {
     }
     double longest = settings_.largest_step;
     bodies_.set_interval(time_, std::min(left, longest));
-    const double speed = bodies_.largest_relative_speed(fluid_, settings_.threads, reduction_);
+    double speed = bodies_.largest_relative_speed(fluid_, settings_.threads, reduction_);
+    for (const auto& [inlet, origin] : inlets_) {
+      speed = std::max(speed, inlet.speed(time_));
+    }
     if (!std::isfinite(speed)) {
       return 0;
     }
