@@ -16,10 +16,7 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-struct Channel : decant::DefaultParts<float> {
-  using Domain = decant::PeriodicDomain<float>;
-  using NeighborSearch = decant::CellGrid<float, Domain>;
-};
+using Channel = decant::PeriodicParts<>;
 
 enum class Drive { push, moving_lid };
 

@@ -16,10 +16,7 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-struct Slab : decant::DefaultParts<float> {
-  using Domain = decant::PeriodicDomain<float>;
-  using NeighborSearch = decant::CellGrid<float, Domain>;
-};
+using Slab = decant::PeriodicParts<>;
 
 struct Wave {
   double squared_frequency_error = 0;  // of omega^2, relative to theory

@@ -15,10 +15,7 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-struct Periodic : decant::DefaultParts<float> {
-  using Domain = decant::PeriodicDomain<float>;
-  using NeighborSearch = decant::CellGrid<float, Domain>;
-};
+using Periodic = decant::PeriodicParts<>;
 
 /// u = -cos(2 pi x) sin(2 pi z), w = sin(2 pi x) cos(2 pi z) at first, in a box of length 1 with `across` particles,
 /// until exp(-8 pi^2 t / Re) has taken it to 1/e; Re = 100.

@@ -17,10 +17,7 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-struct Slab : decant::DefaultParts<float> {
-  using Domain = decant::PeriodicDomain<float>;
-  using NeighborSearch = decant::CellGrid<float, Domain>;
-};
+using Slab = decant::PeriodicParts<>;
 
 enum class Walls { boxes, meshes };
 

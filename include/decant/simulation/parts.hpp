@@ -38,6 +38,13 @@ struct DefaultParts {
   using Boundary = RigidBodies<Scalar>;
 };
 
+/// In a box that repeats itself: Simulator<PeriodicParts<>>(settings, PeriodicDomain<float>({length, 0, 0})).
+template <class ScalarType = float>
+struct PeriodicParts : DefaultParts<ScalarType> {
+  using Domain = PeriodicDomain<ScalarType>;
+  using NeighborSearch = CellGrid<ScalarType, Domain>;
+};
+
 /// With surface tension, for drops and thin jets.
 template <class ScalarType = float>
 struct CapillaryParts : DefaultParts<ScalarType> {
