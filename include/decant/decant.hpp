@@ -22,6 +22,7 @@
 #include <decant/core/domain.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
+#include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
