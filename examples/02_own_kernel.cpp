@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A smoothing kernel of one's own: the first that was used for SPH, by Lucy 1977, under a block of water that collapses.
+// A smoothing kernel of one's own: the first that was used for SPH, by Lucy 1977, under a block of water that
+// collapses.
 
 #include <algorithm>
 #include <cmath>
@@ -55,7 +56,8 @@ int main() {
   double error = 0;
   for (int frame = 0; frame < 90; ++frame) {
     const StepReport report = simulator.step(1.0 / 30);
-    if (!report.advanced()) return 1;
+    if (!report.advanced())
+      return 1;
     error = std::max(error, report.density_error);
   }
   const double height = 2 * simulator.fluid().position.row(2).mean();  // of level water

@@ -102,12 +102,14 @@ int main() {
   }
   simulator.add_particles(heap, PointArray<float>::Zero(3, heap.cols()), 0);
   for (int frame = 0; frame < 60; ++frame) {
-    if (!simulator.step(1.0 / 30).advanced()) return 1;
+    if (!simulator.step(1.0 / 30).advanced())
+      return 1;
   }
   const double volume = static_cast<double>(heap.cols()) * std::pow(settings.spacing, 3);
   const double center = simulator.fluid().position.row(2).mean();
   const double farthest = simulator.fluid().position.colwise().norm().maxCoeff();
-  // A half ball's centre of mass is 3 / 8 of its radius below the middle; liquid beyond that adds a layer at the middle.
+  // A half ball's centre of mass is 3 / 8 of its radius below the middle; liquid beyond that adds a layer at the
+  // middle.
   const double theory = -3.0 / 8 * radius * half / volume;
   std::printf("centre of mass %.1f mm below the middle, in theory %.1f mm; farthest particle at %.1f of %.1f mm\n",
               -1e3 * center, -1e3 * theory, 1e3 * farthest, 1e3 * radius);

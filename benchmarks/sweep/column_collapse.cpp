@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Workloads W1 to W3: a cube of n^3 particles of water collapses in a closed box, with the default simulator. Prints one
-// row of CSV per size and number of threads; errors are recomputed by brute force from the last snapshot.
-// Usage: bench_sweep_column_collapse [largest n = 40] [seconds of W1 = 2]
+// Workloads W1 to W3: a cube of n^3 particles of water collapses in a closed box, with the default simulator. Prints
+// one row of CSV per size and number of threads; errors are recomputed by brute force from the last snapshot. Usage:
+// bench_sweep_column_collapse [largest n = 40] [seconds of W1 = 2]
 
 #include <algorithm>
 #include <chrono>
@@ -52,7 +52,8 @@ double mean_compression(const LiquidSimulator& simulator) {
   for (Index i = 0; i < fluid.size(); ++i) {
     const double m = static_cast<double>(fluid.mass[i]);
     double density = m * CubicSpline<double>::value(0.0, h) + 1000 * static_cast<double>(walls.share[i]);
-    grid.for_each(i, [&](Index, double r_squared) { density += m * CubicSpline<double>::value(std::sqrt(r_squared), h); });
+    grid.for_each(i,
+                  [&](Index, double r_squared) { density += m * CubicSpline<double>::value(std::sqrt(r_squared), h); });
     total += std::max(density / 1000 - 1, 0.0);
   }
   return total / static_cast<double>(fluid.size());
@@ -63,8 +64,9 @@ double mean_compression(const LiquidSimulator& simulator) {
 int main(int count, char** arguments) {
   const int largest = count > 1 ? std::atoi(arguments[1]) : 40;
   const double w1_seconds = count > 2 ? std::atof(arguments[2]) : 2;
-  std::printf("n,particles,threads,simulated_s,wall_s,wall_per_simulated,sub_steps,density_iterations,"
-              "divergence_iterations,ms_per_sub_step,us_per_particle_step,mean_compression,compiler,flags,cpu\n");
+  std::printf(
+      "n,particles,threads,simulated_s,wall_s,wall_per_simulated,sub_steps,density_iterations,"
+      "divergence_iterations,ms_per_sub_step,us_per_particle_step,mean_compression,compiler,flags,cpu\n");
   for (const int n : {10, 20, 40, 80, 100}) {
     for (const int threads : {1, 2}) {
       if (n > largest) {

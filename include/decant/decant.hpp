@@ -14,6 +14,7 @@
 #include <decant/boundary/rigid_bodies.hpp>
 #include <decant/boundary/sampled_wall.hpp>
 #include <decant/boundary/shapes.hpp>
+#include <decant/boundary/shielding.hpp>
 #include <decant/boundary/solid_parts.hpp>
 #include <decant/boundary/swept_contact.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
@@ -56,5 +57,6 @@
 #include <decant/simulation/liquid.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
+#include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 #include <decant/version.hpp>

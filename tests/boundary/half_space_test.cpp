@@ -52,7 +52,8 @@ TEST_CASE("half-space slope is the derivative of the fraction") {
   for (const double a : {-1.2, -0.4, 0.2, 0.7, 1.3, 1.8}) {
     const double step = 1e-2;
     const double difference = (plane.fraction((a - step) * h) - plane.fraction((a + step) * h)) / (2 * step * h);
-    CHECK(plane.slope(a * h) == Approx(difference).epsilon(2e-3).margin(2e-3 * plane.slope(0)));  // differences over 0.02 h
+    CHECK(plane.slope(a * h) ==
+          Approx(difference).epsilon(2e-3).margin(2e-3 * plane.slope(0)));  // differences over 0.02 h
   }
 }
 

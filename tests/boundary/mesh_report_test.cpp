@@ -131,7 +131,8 @@ TEST_CASE("what a mesh holds is reported for the way up that is asked for") {
 
   TriangleMesh torn = glass;
   std::erase_if(torn.triangles, [&](const TriangleMesh::Triangle& triangle) {
-    return std::all_of(triangle.begin(), triangle.end(), [&](auto vertex) { return glass.vertices[vertex][2] < 0.001; });
+    return std::all_of(triangle.begin(), triangle.end(),
+                       [&](auto vertex) { return glass.vertices[vertex][2] < 0.001; });
   });
   REQUIRE(torn.triangles.size() < glass.triangles.size());
   report = decant::inspect(torn, 0.005, Point::UnitZ());

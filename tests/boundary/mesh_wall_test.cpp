@@ -21,7 +21,8 @@ constexpr double spacing = 0.005;
 decant::TriangleMesh box_mesh(const Vector3<double>& min, const Vector3<double>& max) {
   decant::TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner) {
-    mesh.vertices.push_back({(corner & 1) ? max[0] : min[0], (corner & 2) ? max[1] : min[1], (corner & 4) ? max[2] : min[2]});
+    mesh.vertices.push_back(
+        {(corner & 1) ? max[0] : min[0], (corner & 2) ? max[1] : min[1], (corner & 4) ? max[2] : min[2]});
   }
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
@@ -84,9 +85,9 @@ TEST_CASE("mesh wall and solid parts agree in a corner") {
   }
   const decant::BoundingVolumeHierarchy surface(corner);
   const auto mesh = decant::MeshWall::of<Kernel>(surface, spacing, spacing, {});
-  const auto parts = decant::SolidParts::of<Kernel>(
-      {decant::SolidBox{{-0.05, -0.05, -0.01}, {0.05, 0.05, 0}}, decant::SolidBox{{-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05}}},
-      spacing, spacing);
+  const auto parts = decant::SolidParts::of<Kernel>({decant::SolidBox{{-0.05, -0.05, -0.01}, {0.05, 0.05, 0}},
+                                                     decant::SolidBox{{-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05}}},
+                                                    spacing, spacing);
   for (const double a : {0.3, 0.5, 0.75}) {
     for (const double b : {0.3, 0.5, 0.75}) {
       decant::WallSample from_mesh, from_parts;
@@ -106,8 +107,8 @@ TEST_CASE("solid parts' gradient is the derivative of their share") {
       {decant::SolidBox{{-0.05, -0.05, -0.01}, {0.05, 0.05, 0}}, decant::SolidRing{0.03, 0.032, 0, 0.05},
        decant::SolidSphere{{0, 0, 0.02}, 0.008}},
       spacing, spacing);
-  for (const Vector3<double>& x : {Vector3<double>(0.027, 0.003, 0.004), Vector3<double>(0.0, 0.002, 0.009),
-                                   Vector3<double>(0.02, 0.016, 0.03)}) {
+  for (const Vector3<double>& x :
+       {Vector3<double>(0.027, 0.003, 0.004), Vector3<double>(0.0, 0.002, 0.009), Vector3<double>(0.02, 0.016, 0.03)}) {
     decant::WallSample here;
     REQUIRE(parts.sample(x, here));
     for (int axis = 0; axis < 3; ++axis) {

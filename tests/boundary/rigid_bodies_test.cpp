@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Rigid bodies: where they are, what liquid feels of them, what stands between two points, and the guard at their walls.
+// Rigid bodies: where they are, what liquid feels of them, what stands between two points, and the guard at their
+// walls.
 
 #include <decant/boundary/rigid_bodies.hpp>
 
@@ -27,7 +28,8 @@ Pose at(const Vector3<double>& x, double angle = 0, const Vector3<double>& axis 
 template <class Bodies>
 BodyId add(Bodies& bodies, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
   using Scalar = typename Bodies::Scalar;
-  return bodies.template add<CubicSpline<Scalar>>("body", std::move(shape), std::move(motion), slip, spacing, spacing, Threads{1});
+  return bodies.template add<CubicSpline<Scalar>>("body", std::move(shape), std::move(motion), slip, spacing, spacing,
+                                                  Threads{1});
 }
 
 template <class Scalar>
@@ -45,7 +47,8 @@ FluidState<Scalar> particles(const std::vector<Vector3<double>>& places, const V
 
 TEMPLATE_TEST_CASE("rigid bodies: a step's velocity is that of the poses", "", float, double) {
   RigidBodies<TestType> bodies;
-  const BodyId body = add(bodies, Box{{0, 0, 0}, {0.1, 0.1, 0.1}}, PoseTrack({{0, at({0, 0, 0})}, {1, at({0.5, 0, 0}, 1)}}));
+  const BodyId body =
+      add(bodies, Box{{0, 0, 0}, {0.1, 0.1, 0.1}}, PoseTrack({{0, at({0, 0, 0})}, {1, at({0.5, 0, 0}, 1)}}));
   CHECK(bodies.size() == 1);
   bodies.set_interval(0.2, 0.01);
   const auto& moved = bodies[body];
@@ -161,7 +164,8 @@ TEMPLATE_TEST_CASE("rigid bodies: a wall however thin separates", "", float, dou
   const Pose pose = at({1, 2, 3}, 1.1, {0, 1, 0});
   add(bodies, CylinderInside{0.04, 0.06, 0.001, Face::PositiveZ}, PoseTrack(pose));
   bodies.set_interval(0, 0.01);
-  const std::vector<Vector3<double>> places{{0.038, 0, 0.03}, {0.043, 0, 0.03}, {0.036, 0.002, 0.032}, {0.042, 0, 0.12}};
+  const std::vector<Vector3<double>> places{
+      {0.038, 0, 0.03}, {0.043, 0, 0.03}, {0.036, 0.002, 0.032}, {0.042, 0, 0.12}};
   std::vector<Vector3<double>> in_world;
   for (const auto& x : places) {
     in_world.push_back(pose * x);

@@ -68,7 +68,8 @@ TEST_CASE("SampledWall covers large and small triangles alike") {
       }
     }
     CHECK(nearest >= least);
-    CHECK(widest_gap < 1.35 * least);  // a full cover leaves no place farther than `least` from all darts; a few are missed
+    CHECK(widest_gap <
+          1.35 * least);  // a full cover leaves no place farther than `least` from all darts; a few are missed
   }
 }
 
@@ -159,8 +160,8 @@ TEST_CASE("SampledWall: a surface smaller than a particle still has one sample a
 
 TEST_CASE("SampledWall serves rigid bodies as MeshWall does") {
   decant::RigidBodies<float, SampledWall> bodies;
-  bodies.add<decant::CubicSpline<float>>("plate", decant::BodyShape{plate(0.03, 2)}, {}, decant::Slip::free, spacing, spacing,
-                                         Threads{1});
+  bodies.add<decant::CubicSpline<float>>("plate", decant::BodyShape{plate(0.03, 2)}, {}, decant::Slip::free, spacing,
+                                         spacing, Threads{1});
   bodies.set_interval(0, 0);
   decant::WallState<float> walls;
   decant::PointArray<float> x(3, 2);

@@ -14,7 +14,8 @@ namespace {
 decant::TriangleMesh closed_box(const Vector3<double>& min, const Vector3<double>& max) {
   decant::TriangleMesh mesh;
   for (int corner = 0; corner < 8; ++corner) {
-    mesh.vertices.push_back({(corner & 1) ? max[0] : min[0], (corner & 2) ? max[1] : min[1], (corner & 4) ? max[2] : min[2]});
+    mesh.vertices.push_back(
+        {(corner & 1) ? max[0] : min[0], (corner & 2) ? max[1] : min[1], (corner & 4) ? max[2] : min[2]});
   }
   mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                     {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};

@@ -43,7 +43,8 @@ TEST_CASE("wall function and its slope and weight belong together") {
   CHECK(wall.share(2 * d) == 0);
   for (const double a : {-0.6, -0.2, 0.1, 0.4, 0.8}) {
     const double step = 1e-5 * d;
-    CHECK(wall.slope(a * d) == Approx((wall.share(a * d - step) - wall.share(a * d + step)) / (2 * step)).epsilon(1e-5));
+    CHECK(wall.slope(a * d) ==
+          Approx((wall.share(a * d - step) - wall.share(a * d + step)) / (2 * step)).epsilon(1e-5));
   }
   // int over the half-space behind a plane of w(r) dV = int_a^R 2 pi r w(r) (r - a) dr
   const double a = 0.3 * d;

@@ -28,8 +28,7 @@ Matrix velocity_gradient(const LooseLiquid<Kernel>& liquid, Index i, bool correc
   using Scalar = typename Kernel::Scalar;
   Matrix result = Matrix::Zero();
   liquid.neighbors.for_each(i, [&](Index j, const Vector3<Scalar>& apart, Scalar r_squared) {
-    const Vector3<Scalar> slope =
-        Kernel::derivative_over_radius(std::sqrt(r_squared), liquid.smoothing_length) * apart;
+    const Vector3<Scalar> slope = Kernel::derivative_over_radius(std::sqrt(r_squared), liquid.smoothing_length) * apart;
     const Vector3<Scalar> gradient = corrected ? liquid.correction.apply(i, slope) : slope;
     const Vector3<Scalar> difference = liquid.fluid.velocity.col(j) - liquid.fluid.velocity.col(i);
     result += static_cast<double>(liquid.fluid.mass[j] / liquid.rest_density) * difference.template cast<double>() *
@@ -43,7 +42,8 @@ LooseLiquid<Kernel> ball_in_linear_flow(const Matrix& flow) {
   using Scalar = typename Kernel::Scalar;
   auto liquid = loose_ball<Kernel>(Scalar(0.005), 6, 0.15, 0);
   for (Index i = 0; i < liquid.fluid.size(); ++i) {
-    liquid.fluid.velocity.col(i) = (flow * liquid.fluid.position.col(i).template cast<double>()).template cast<Scalar>();
+    liquid.fluid.velocity.col(i) =
+        (flow * liquid.fluid.position.col(i).template cast<double>()).template cast<Scalar>();
   }
   return liquid;
 }

@@ -90,7 +90,8 @@ TEMPLATE_TEST_CASE("Endlessly thick liquid moves as a rigid body with the moment
   auto liquid = loose_ball<CubicSpline<Scalar>>(Scalar(0.005), 4, 0.2, 0.2);
   const Vector3<Scalar> spin(Scalar(20), Scalar(-10), Scalar(30));
   for (Index i = 0; i < liquid.fluid.size(); ++i) {
-    liquid.fluid.velocity.col(i) += Vector3<Scalar>(1, 0, -1) + spin.cross(Vector3<Scalar>(liquid.fluid.position.col(i)));
+    liquid.fluid.velocity.col(i) +=
+        Vector3<Scalar>(1, 0, -1) + spin.cross(Vector3<Scalar>(liquid.fluid.position.col(i)));
   }
   liquid.time_step = Scalar(0.01);
   ViscosityWeiler2018<Scalar> force;

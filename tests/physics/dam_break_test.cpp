@@ -22,7 +22,8 @@ namespace {
 using Series = std::vector<std::pair<double, double>>;  // T, Z
 
 double at(const Series& series, double t) {
-  const auto after = std::upper_bound(series.begin(), series.end(), t, [](double a, const auto& b) { return a < b.first; });
+  const auto after =
+      std::upper_bound(series.begin(), series.end(), t, [](double a, const auto& b) { return a < b.first; });
   if (after == series.begin()) {
     return series.front().second;
   }
@@ -50,8 +51,8 @@ struct Misfit {
 };
 
 /// error(simulated, measured), for the one shift in time that serves best: the zero of T is uncertain by up to 0.3.
-/// The worst is the distance to what was simulated within `around` of the same time: where a front arrives, a curve that
-/// is early by 0.05 is off by all of its height.
+/// The worst is the distance to what was simulated within `around` of the same time: where a front arrives, a curve
+/// that is early by 0.05 is off by all of its height.
 template <class Error>
 Misfit misfit(const std::vector<std::pair<Series, Series>>& simulated_and_measured, double last, double around,
               Error&& error) {
@@ -105,9 +106,8 @@ Misfit front_misfit(const std::string& file, double a, int across, std::size_t r
     gauges.observe(simulator.fluid(), settings.threads);
     simulated.emplace_back(simulator.time() / unit, gauges.front().value() / a);
   }
-  return misfit({{simulated, measured}}, 1e9, 0, [](double z, double measured_z) {
-    return std::abs(z - measured_z) / measured_z;
-  });
+  return misfit({{simulated, measured}}, 1e9, 0,
+                [](double z, double measured_z) { return std::abs(z - measured_z) / measured_z; });
 }
 
 }  // namespace

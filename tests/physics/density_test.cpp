@@ -51,8 +51,9 @@ TEST_CASE("mean density error of a collapsing block stays within tolerance in ev
     double excess = 0;
     for (Index i = 0; i < fluid.size(); ++i) {
       double density = fluid.mass[i] * Kernel::value(0.0, h) + settings.liquid.density * simulator.walls().share[i];
-      pairs.for_each(static_cast<Index>(place_of[fluid.id[i]]),
-                     [&](Index, double r_squared) { density += fluid.mass[0] * Kernel::value(std::sqrt(r_squared), h); });
+      pairs.for_each(static_cast<Index>(place_of[fluid.id[i]]), [&](Index, double r_squared) {
+        density += fluid.mass[0] * Kernel::value(std::sqrt(r_squared), h);
+      });
       largest_difference = std::max(largest_difference, std::abs(density - fluid.density[i]) / settings.liquid.density);
       excess += std::max(density / settings.liquid.density - 1, 0.0);
     }

@@ -43,7 +43,8 @@ decant::Simulator<Parts> drop(const Vector& gravity, double step) {
   for (Index i = 0; i < cube.cols(); ++i) {
     const Vector x = cube.col(i);
     if (x.norm() < 0.028) {
-      const Vector v = Vector(0.5, -0.2, 1) + Vector(2, 5, 3).cross(x) + Vector(speed(random), speed(random), speed(random));
+      const Vector v =
+          Vector(0.5, -0.2, 1) + Vector(2, 5, 3).cross(x) + Vector(speed(random), speed(random), speed(random));
       simulator.add_particles(x, v, 0);
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Still water 20 cm deep, from a lattice that is a little out of order: p = rho g z, level within half a spacing, at rest
-// for good.
+// Still water 20 cm deep, from a lattice that is a little out of order: p = rho g z, level within half a spacing, at
+// rest for good.
 
 #include <algorithm>
 #include <cmath>
@@ -22,9 +22,9 @@ constexpr int width = 6;       // spacings
 struct Reading {
   double lowest_level = 1e9, highest_level = -1e9;
   double early_energy = 0, late_energy = 0;  // mean of the second quarter of the run and of the last [J]
-  double drift = 0;              // of the centre of mass, between these two quarters [m]
+  double drift = 0;                          // of the centre of mass, between these two quarters [m]
   double largest_density_error = 0;
-  double pressure_error = 0;     // mean over layers of the error of a layer's mean in time, over rho g depth
+  double pressure_error = 0;  // mean over layers of the error of a layer's mean in time, over rho g depth
   bool always_converged = true;
 };
 
@@ -109,7 +109,8 @@ void require_at_rest(const Reading& reading, double spacing) {
   CHECK(reading.lowest_level > depth - 0.5 * spacing);
   CHECK(reading.highest_level < depth + 0.5 * spacing);
   CHECK(reading.pressure_error < 0.02);
-  // what motion is left is noise, of which the means of two quarters differ by some tenth; it must be small and not grow
+  // what motion is left is noise, of which the means of two quarters differ by some tenth; it must be small and not
+  // grow
   CHECK(reading.late_energy <= 1.25 * reading.early_energy);
   const double mass = 998.2 * width * width * spacing * spacing * depth;
   CHECK(std::sqrt(2 * reading.late_energy / mass) < 0.02);
@@ -123,7 +124,9 @@ TEST_CASE("a column keeps its level and comes to rest at 20 mm") { require_at_re
 
 TEST_CASE("a column keeps its level and comes to rest at 10 mm") { require_at_rest(watch_column(0.01, 4), 0.01); }
 
-TEST_CASE("a column keeps its level and comes to rest at 5 mm", "[slow]") { require_at_rest(watch_column(0.005, 4), 0.005); }
+TEST_CASE("a column keeps its level and comes to rest at 5 mm", "[slow]") {
+  require_at_rest(watch_column(0.005, 4), 0.005);
+}
 
 TEST_CASE("a column does not drift in 10 s", "[slow]") {
   const Reading reading = watch_column(0.01, 10);

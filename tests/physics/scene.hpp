@@ -8,6 +8,7 @@
 
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/types.hpp>
+#include <decant/simulation/simulator.hpp>
 
 namespace decant_test {
 
@@ -28,6 +29,21 @@ decant::PointArray<Scalar> block(const decant::Vector3<double>& corner, int nx, 
     }
   }
   return places;
+}
+
+/// A simulator of a slice of the world: `width` particles across, which is y, and periodic there. One thread.
+inline decant::Simulator<decant::PeriodicParts<>> slice(double spacing, int width) {
+  decant::SimulatorSettings settings;
+  settings.spacing = spacing;
+  settings.threads = {1};
+  const decant::PeriodicParts<>::Domain domain(decant::Vector3<float>(0, static_cast<float>(width * spacing), 0));
+  return decant::Simulator<decant::PeriodicParts<>>(settings, domain);
+}
+
+/// The block of a slice, from the origin on. @param length, depth along x and z [m].
+inline decant::PointArray<float> slice_block(double length, int width, double depth, double spacing) {
+  return block<float>({0, 0, 0}, static_cast<int>(std::lround(length / spacing)), width,
+                      static_cast<int>(std::lround(depth / spacing)), spacing);
 }
 
 /// Mean of f(particle) over all particles.

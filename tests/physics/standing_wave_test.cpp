@@ -16,26 +16,19 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-using Slab = decant::PeriodicParts<>;
-
 struct Wave {
   double squared_frequency_error = 0;  // of omega^2, relative to theory
   double kept = 0;                     // fourth amplitude over the first
 };
 
-/// Half a wave length in 20 cm, 10 cm deep, periodic across; 0.1 m/s at the surface, so amplitudes stay below a tenth of
-/// the depth. The centre of mass goes to and fro as the wave does.
+/// Half a wave length in 20 cm, 10 cm deep, periodic across; 0.1 m/s at the surface, so amplitudes stay below a tenth
+/// of the depth. The centre of mass goes to and fro as the wave does.
 Wave watch_wave(double spacing) {
   const double length = 0.2, depth = 0.1, k = std::numbers::pi / length, speed = 0.1;
   const int width = 6;
-  decant::SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {1};
-  const Slab::Domain domain(decant::Vector3<float>(0, static_cast<float>(width * spacing), 0));
-  decant::Simulator<Slab> simulator(settings, domain);
+  auto simulator = decant_test::slice(spacing, width);
   simulator.add_body("tank", decant::BoxInside{{0, -0.5, 0}, {length, 0.5, 2 * depth}, 0.02, {}});
-  const auto places = decant_test::block<float>({0, 0, 0}, static_cast<int>(std::lround(length / spacing)), width,
-                                                static_cast<int>(std::lround(depth / spacing)), spacing);
+  const auto places = decant_test::slice_block(length, width, depth, spacing);
   decant::PointArray<float> velocity(3, places.cols());
   for (Index i = 0; i < places.cols(); ++i) {
     const double x = static_cast<double>(places(0, i)), z = static_cast<double>(places(2, i));

@@ -22,7 +22,8 @@ TEST_CASE("in an accelerated tank the surface leans by a over g") {
   std::vector<decant::PoseTrack::Sample> samples;
   const auto place = [&](double t) {
     const double in_ramp = std::min(t, ramp), after = t - in_ramp;
-    return start_speed * t + acceleration * (std::pow(in_ramp, 3) / (6 * ramp) + 0.5 * ramp * after + 0.5 * after * after);
+    return start_speed * t +
+           acceleration * (std::pow(in_ramp, 3) / (6 * ramp) + 0.5 * ramp * after + 0.5 * after * after);
   };
   for (int k = 0; k <= static_cast<int>(end * 1000) + 10; ++k) {
     samples.push_back({0.001 * k, {Eigen::Quaterniond::Identity(), Vector(place(0.001 * k), 0, 0)}});

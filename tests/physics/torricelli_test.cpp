@@ -17,8 +17,6 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-using Slab = decant::PeriodicParts<>;
-
 enum class Walls { boxes, meshes };
 
 struct Outflow {
@@ -32,11 +30,7 @@ struct Outflow {
 Outflow pour_out(double spacing, Walls walls) {
   const double slit = 0.04, length = 0.16, height = 0.24, thickness = 0.02;
   const int width = 6;
-  decant::SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {1};
-  const Slab::Domain domain(decant::Vector3<float>(0, static_cast<float>(width * spacing), 0));
-  decant::Simulator<Slab> simulator(settings, domain);
+  auto simulator = decant_test::slice(spacing, width);
   const auto add = [&](const char* name, double low_x, double high_x, double low_z, double high_z) {
     const double past = 3 * spacing;  // over both ends of the period
     const decant::Box box{{low_x, -past, low_z}, {high_x, width * spacing + past, high_z}};
@@ -46,8 +40,7 @@ Outflow pour_out(double spacing, Walls walls) {
   add("right wall", length, length + 0.03, 0, 1.5 * height);
   add("left floor", -0.03, 0.5 * (length - slit), -thickness, 0);
   add("right floor", 0.5 * (length + slit), length + 0.03, -thickness, 0);
-  const auto places = decant_test::block<float>({0, 0, 0}, static_cast<int>(std::lround(length / spacing)), width,
-                                                static_cast<int>(std::lround(height / spacing)), spacing);
+  const auto places = decant_test::slice_block(length, width, height, spacing);
   simulator.add_particles(places, decant::PointArray<float>::Zero(3, places.cols()), 0);
 
   // Lines through the heights of nine parts of the way, which are some tens of readings each, give the flow.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// No allocation in the frame loop after warm-up. The replaced operators only count, and only while a frame is running, so
-// that other tests of the program are not disturbed. They are not inlined: GCC would see malloc meet delete and warn.
+// No allocation in the frame loop after warm-up. The replaced operators only count, and only while a frame is running,
+// so that other tests of the program are not disturbed. They are not inlined: GCC would see malloc meet delete and
+// warn.
 
 #include <decant/simulation/simulator.hpp>
 
@@ -48,8 +49,12 @@ void* or_throw(void* place) {
 [[gnu::noinline]] void* operator new[](std::size_t size) { return or_throw(allocate(size)); }
 [[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
 [[gnu::noinline]] void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) { return or_throw(allocate_aligned(size, alignment)); }
-[[gnu::noinline]] void* operator new[](std::size_t size, std::align_val_t alignment) { return or_throw(allocate_aligned(size, alignment)); }
+[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
+  return or_throw(allocate_aligned(size, alignment));
+}
+[[gnu::noinline]] void* operator new[](std::size_t size, std::align_val_t alignment) {
+  return or_throw(allocate_aligned(size, alignment));
+}
 [[gnu::noinline]] void operator delete(void* place) noexcept { std::free(place); }
 [[gnu::noinline]] void operator delete[](void* place) noexcept { std::free(place); }
 [[gnu::noinline]] void operator delete(void* place, std::size_t) noexcept { std::free(place); }
@@ -74,7 +79,8 @@ std::vector<long> allocations_per_frame(int threads, int warm_up, int frames) {
   std::vector<PoseTrack::Sample> rocking;
   for (int k = 0; k <= 400; ++k) {
     const double t = 0.01 * k;
-    rocking.push_back({t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(7 * t), Eigen::Vector3d::UnitY())), {}}});
+    rocking.push_back(
+        {t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(7 * t), Eigen::Vector3d::UnitY())), {}}});
     rocking.back().pose.translation.setZero();
   }
   const BodyId box = simulator.add_body("box", BoxInside{{0, 0, 0}, {0.06, 0.06, 0.08}, 0.002, {}}, PoseTrack(rocking));

@@ -53,11 +53,10 @@ Vessel cylinder(double radius, double height, double wall, bool open) {
 }
 
 Vessel box(const Vector3<double>& size, double wall) {
-  return {"closed box", BoxInside{Vector3<double>::Zero(), size, wall, {}},
-          [=](const Vector3<double>& x) {
-            return (x.array() > -slack).all() && (x.array() < size.array() + slack).all();
-          },
-          unbounded};
+  return {
+      "closed box", BoxInside{Vector3<double>::Zero(), size, wall, {}},
+      [=](const Vector3<double>& x) { return (x.array() > -slack).all() && (x.array() < size.array() + slack).all(); },
+      unbounded};
 }
 
 Vessel cup(double floor_radius, double rim_radius, double height, double wall) {
@@ -86,11 +85,11 @@ Vessel scan(const std::string& name, const std::filesystem::path& file, double s
 }
 
 struct Drive {
-  double speed = 0;       // largest of the body's origin [m/s]
-  double stroke = 0.06;   // of the shaking [m]
-  double tilt = 0;        // rocks to and fro up to here [rad]
-  double spin = 0;        // about the body's z [rad/s]
-  double tumble = 0;      // about a level axis [rad/s]
+  double speed = 0;      // largest of the body's origin [m/s]
+  double stroke = 0.06;  // of the shaking [m]
+  double tilt = 0;       // rocks to and fro up to here [rad]
+  double spin = 0;       // about the body's z [rad/s]
+  double tumble = 0;     // about a level axis [rad/s]
 };
 
 PoseTrack driven(const Drive& drive, double seconds) {
@@ -100,9 +99,9 @@ PoseTrack driven(const Drive& drive, double seconds) {
     // starts within a fifth of a second
     const double on = std::min(1.0, t / 0.2);
     Pose pose;
-    pose.translation = on * drive.stroke *
-                       Vector3<double>(0.8 * std::sin(pulse * t), 0.3 * std::sin(0.73 * pulse * t),
-                                       0.5 * std::sin(0.61 * pulse * t));
+    pose.translation =
+        on * drive.stroke *
+        Vector3<double>(0.8 * std::sin(pulse * t), 0.3 * std::sin(0.73 * pulse * t), 0.5 * std::sin(0.61 * pulse * t));
     pose.rotation = Eigen::AngleAxisd(on * drive.tilt * std::sin(5 * t), Eigen::Vector3d(1, 0.5, 0).normalized()) *
                     Eigen::AngleAxisd(drive.tumble * t, Eigen::Vector3d(0.3, 1, 0).normalized()) *
                     Eigen::AngleAxisd(drive.spin * t, Eigen::Vector3d::UnitZ());
@@ -184,7 +183,8 @@ Outcome watch(Simulator<Parts>& simulator, BodyId body, const Vessel& vessel, do
       } else if (before.region != region && before.region != Region::above && region != Region::above) {
         // From inside to outside or back within one call, both below the rim: only over it, and only if that is near.
         const double way = 2 * vessel.rim - before.height - x[2];
-        const double reach = 1.5 * frame * (std::max(before.speed, speed) + std::max(wall_speed, earlier_wall_speed)) + spacing;
+        const double reach =
+            1.5 * frame * (std::max(before.speed, speed) + std::max(wall_speed, earlier_wall_speed)) + spacing;
         outcome.through_wall += way > reach ? 1 : 0;
       }
       if (region == Region::outside && surface.inside_material(x) &&
@@ -198,7 +198,8 @@ Outcome watch(Simulator<Parts>& simulator, BodyId body, const Vessel& vessel, do
     // what has left for good would fall ever faster and shorten everybody's steps
     removed += simulator.remove_particles_if([&](Index i) {
       const Vector3<double> x = body_from_world * Vector3<double>(fluid.position.col(i).template cast<double>());
-      return region_of(x) != Region::inside && (x - surface.bounds().center()).norm() > surface.bounds().diagonal().norm();
+      return region_of(x) != Region::inside &&
+             (x - surface.bounds().center()).norm() > surface.bounds().diagonal().norm();
     });
   }
   return outcome;
@@ -217,8 +218,8 @@ Outcome shake(const Vessel& vessel, double spacing, double filled, const Drive& 
 }
 
 void check_held(const Vessel& vessel, const Outcome& outcome) {
-  INFO(vessel.name << ": " << outcome.particles << " particles, inside " << outcome.inside << ", spilled " << outcome.spilled
-                   << ", guarded " << outcome.guarded << ", fastest [m/s] " << outcome.fastest);
+  INFO(vessel.name << ": " << outcome.particles << " particles, inside " << outcome.inside << ", spilled "
+                   << outcome.spilled << ", guarded " << outcome.guarded << ", fastest [m/s] " << outcome.fastest);
   CHECK(outcome.particles > 50);
   CHECK(outcome.inside + outcome.spilled == outcome.particles);
   CHECK(outcome.through_wall == 0);
@@ -239,7 +240,7 @@ void check(const Vessel& vessel, double spacing, double filled, const Drive& dri
 const Drive hard{2.0, 0.06, 0.5, 2 * pi, 0};
 const Drive rolling{2.0, 0.06, 0.0, 0, 2 * pi};
 const Drive lively{0.6, 0.05, 0.2, 2 * pi, 0};  // spills some, keeps some
-const Drive gentle{0.05, 0.02, 0.1, 1, 0};  // far below the liquid's own frequencies
+const Drive gentle{0.05, 0.02, 0.1, 1, 0};      // far below the liquid's own frequencies
 
 }  // namespace
 
@@ -276,7 +277,8 @@ TEST_CASE("containers: bowls spill over the rim only") {
 }
 
 TEST_CASE("containers: gently moved vessels keep everything") {
-  for (const Vessel& vessel : {cylinder(0.03, 0.08, 0.001, true), cup(0.03, 0.04, 0.09, 0.002), bowl(0.06, 0.05, 0.002)}) {
+  for (const Vessel& vessel :
+       {cylinder(0.03, 0.08, 0.001, true), cup(0.03, 0.04, 0.09, 0.002), bowl(0.06, 0.05, 0.002)}) {
     const Outcome outcome = shake(vessel, 0.008, 0.4, gentle, 1);
     check_held(vessel, outcome);
     CHECK(outcome.inside == outcome.particles);
@@ -305,7 +307,8 @@ TEST_CASE("containers: a cup that is turned over is empty and all of it left ove
 namespace {
 
 // A cup full of liquid that stands at rest, within a box full of liquid around it or alone, after some steps.
-std::unordered_map<std::uint32_t, std::array<Vector3<double>, 2>> full_cup(bool surrounded, int frames, std::vector<double>& densities) {
+std::unordered_map<std::uint32_t, std::array<Vector3<double>, 2>> full_cup(bool surrounded, int frames,
+                                                                           std::vector<double>& densities) {
   SimulatorSettings settings;
   settings.spacing = 0.005;
   settings.threads = {1};
@@ -316,7 +319,8 @@ std::unordered_map<std::uint32_t, std::array<Vector3<double>, 2>> full_cup(bool 
   simulator.pressure_solver().divergence_tolerance = 1e-6;
   const double d = settings.spacing, wall = 0.001;
   const BodyId cup_body = simulator.add_body("cup", BoxInside{{0, 0, 0}, {6 * d, 6 * d, 6 * d}, wall, Face::PositiveZ});
-  const BodyId tank = simulator.add_body("tank", BoxInside{{-5 * d, -5 * d, -5 * d}, {11 * d, 11 * d, 20 * d}, 0.002, Face::PositiveZ});
+  const BodyId tank =
+      simulator.add_body("tank", BoxInside{{-5 * d, -5 * d, -5 * d}, {11 * d, 11 * d, 20 * d}, 0.002, Face::PositiveZ});
   std::vector<Vector3<double>> in, out;
   for (double x = -4.5 * d; x < 11 * d; x += d) {
     for (double y = -4.5 * d; y < 11 * d; y += d) {
@@ -324,7 +328,8 @@ std::unordered_map<std::uint32_t, std::array<Vector3<double>, 2>> full_cup(bool 
         const Vector3<double> place(x, y, z);
         if ((place.array() > 0).all() && x < 6 * d && y < 6 * d) {
           in.push_back(place);
-        } else if (x < -wall - 0.4 * d || y < -wall - 0.4 * d || z < -wall - 0.4 * d || x > 6 * d + wall + 0.4 * d || y > 6 * d + wall + 0.4 * d) {
+        } else if (x < -wall - 0.4 * d || y < -wall - 0.4 * d || z < -wall - 0.4 * d || x > 6 * d + wall + 0.4 * d ||
+                   y > 6 * d + wall + 0.4 * d) {
           out.push_back(place);
         }
       }
@@ -411,9 +416,10 @@ TEST_CASE("containers: a plate of 1 mm hides what is behind it from everybody be
 
 TEST_CASE("containers: real cups and mugs and bowls hold when tilted and shaken", "[slow]") {
   const double spacing = 0.008;
-  for (const auto& [file, drive] :
-       {std::pair<const char*, Drive>{"meshes_contactdb/cup.stl", hard}, {"meshes_contactdb/bowl.stl", hard},
-        {"meshes_ycb/025_mug.obj", hard}, {"meshes_ycb/024_bowl.obj", hard}}) {
+  for (const auto& [file, drive] : {std::pair<const char*, Drive>{"meshes_contactdb/cup.stl", hard},
+                                    {"meshes_contactdb/bowl.stl", hard},
+                                    {"meshes_ycb/025_mug.obj", hard},
+                                    {"meshes_ycb/024_bowl.obj", hard}}) {
     if (const auto path = decant_test::measurements(file)) {
       check(scan(file, *path, spacing), spacing, 0.5, drive, 1);
     }

@@ -34,7 +34,8 @@ Simulator<Parts> splash(int threads, int per_side = 10) {
   std::vector<PoseTrack::Sample> rocking;
   for (int k = 0; k <= 100; ++k) {
     const double t = 0.01 * k;
-    rocking.push_back({t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(9 * t), Eigen::Vector3d::UnitY())), {}}});
+    rocking.push_back(
+        {t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(9 * t), Eigen::Vector3d::UnitY())), {}}});
     rocking.back().pose.translation = {0.01 * std::sin(12 * t), 0, 0};
   }
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, 0.0601, 0.12}, 0.002, {}}, PoseTrack(rocking));
@@ -121,8 +122,9 @@ TEMPLATE_TEST_CASE("determinism: the same bits with 1 and 2 and 4 threads", "", 
   }
 }
 
-TEMPLATE_TEST_CASE("determinism: the same bits with 1 and 2 and 4 threads for other parts", "", StateEquationParts<float>,
-                   PositionBasedParts<float>, ThickLiquidParts<float>, CapillaryParts<float>, TreeParts<float>) {
+TEMPLATE_TEST_CASE("determinism: the same bits with 1 and 2 and 4 threads for other parts", "",
+                   StateEquationParts<float>, PositionBasedParts<float>, ThickLiquidParts<float>, CapillaryParts<float>,
+                   TreeParts<float>) {
   auto one = splash<TestType>(1, 8);
   const auto expected = run(one, 4);
   for (const int threads : {2, 4}) {

@@ -104,8 +104,8 @@ TEST_CASE("fill: a moving container is held while it is filled") {
   const double spacing = 0.008;
   LiquidSimulator simulator(with_spacing(spacing));
   const Pose later{Eigen::Quaterniond::Identity(), {1, 0, 0}};
-  const BodyId body =
-      simulator.add_body("glass", CylinderInside{0.04, 0.08, 0.002, Face::PositiveZ}, PoseTrack({{0, Pose{}}, {1, later}}));
+  const BodyId body = simulator.add_body("glass", CylinderInside{0.04, 0.08, 0.002, Face::PositiveZ},
+                                         PoseTrack({{0, Pose{}}, {1, later}}));
   fill(simulator, body, FillAmount::fraction(0.3));
   CHECK(simulator.time() == 0);
   CHECK(simulator.bodies()[body].motion.end_time() == 1);

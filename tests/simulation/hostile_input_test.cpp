@@ -73,7 +73,8 @@ Simulator<DefaultParts<Scalar>> half_full_box() {
 template <class Array>
 bool same_bits(const Array& a, const Array& b) {
   return a.count() == b.count() &&
-         (a.count() == 0 || std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(*a.data())) == 0);
+         (a.count() == 0 ||
+          std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(*a.data())) == 0);
 }
 
 template <class Scalar>
@@ -111,9 +112,18 @@ TEST_CASE("hostile: settings out of range are refused in one line that names the
       {"viscosity", [](SimulatorSettings& s) { s.liquid.dynamic_viscosity = not_a_number; }},
       {"surface tension", [](SimulatorSettings& s) { s.liquid.surface_tension = -1; }},
       {"surface tension", [](SimulatorSettings& s) { s.liquid.surface_tension = not_a_number; }},
-      {"gravity", [](SimulatorSettings& s) { s.gravity = {0, 0, not_a_number}; }},
-      {"gravity", [](SimulatorSettings& s) { s.gravity = {0, unbounded, 0}; }},
-      {"gravity", [](SimulatorSettings& s) { s.gravity = {0, 0, -1e7}; }},
+      {"gravity",
+       [](SimulatorSettings& s) {
+         s.gravity = {0, 0, not_a_number};
+       }},
+      {"gravity",
+       [](SimulatorSettings& s) {
+         s.gravity = {0, unbounded, 0};
+       }},
+      {"gravity",
+       [](SimulatorSettings& s) {
+         s.gravity = {0, 0, -1e7};
+       }},
       {"support_in_spacings", [](SimulatorSettings& s) { s.support_in_spacings = 0; }},
       {"support_in_spacings", [](SimulatorSettings& s) { s.support_in_spacings = 100; }},
       {"support_in_spacings", [](SimulatorSettings& s) { s.support_in_spacings = not_a_number; }},
@@ -243,7 +253,8 @@ TEMPLATE_TEST_CASE("hostile: frame times out of range change nothing", "", float
   CHECK(simulator.step(1e6).status == StepStatus::too_many_steps);
 }
 
-TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the frame and stays as it was", "", float, double) {
+TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the frame and stays as it was", "", float,
+                   double) {
   for (const double bad : {not_a_number, unbounded, -unbounded, 1e30}) {
     for (const bool in_velocity : {true, false}) {
       for (const double fixed : {0.0, 0.001}) {
@@ -308,7 +319,8 @@ TEMPLATE_TEST_CASE("hostile: a dozen particles at one place burst or are refused
     Index beneath = 0;
     for (Index i = 0; i < simulator.fluid().size(); ++i) {
       const Vector3<double> place = simulator.fluid().position.col(i).template cast<double>();
-      beneath += place.z() < 0 && (place.head<2>().array() > 0).all() && (place.head<2>().array() < 0.048).all() ? 1 : 0;
+      beneath +=
+          place.z() < 0 && (place.head<2>().array() > 0).all() && (place.head<2>().array() < 0.048).all() ? 1 : 0;
     }
     CHECK(beneath == 0);
   }
@@ -370,7 +382,8 @@ TEST_CASE("hostile: a body that is put into the liquid pushes it out and loses n
 TEST_CASE("hostile: a body driven against the floor reports what it squeezes out") {
   auto simulator = half_full_box<float>();
   const Index count = simulator.fluid().size();
-  const BodyId ball = simulator.add_body("ball", Sphere{{0, 0, 0}, 0.012}, PoseTrack(Pose{{1, 0, 0, 0}, {0.024, 0.024, 0.12}}));
+  const BodyId ball =
+      simulator.add_body("ball", Sphere{{0, 0, 0}, 0.012}, PoseTrack(Pose{{1, 0, 0, 0}, {0.024, 0.024, 0.12}}));
   simulator.move_body(ball, Pose{{1, 0, 0, 0}, {0.024, 0.024, 0.0}}, 0.5);
   StepReport report;
   for (int k = 0; k < 40; ++k) {
@@ -391,7 +404,8 @@ TEST_CASE("hostile: a pose that jumps by a metre is refused with a status or car
   for (const double duration : {1e-9, 1e-4, 0.01}) {
     auto simulator = half_full_box<float>();
     const Pose there{Eigen::Quaterniond::Identity(), {1, 0, 0}};
-    simulator.set_motion(0, PoseTrack({{simulator.time() + 0.005, Pose{}}, {simulator.time() + 0.005 + duration, there}}));
+    simulator.set_motion(0,
+                         PoseTrack({{simulator.time() + 0.005, Pose{}}, {simulator.time() + 0.005 + duration, there}}));
     const auto before = simulator.fluid();
     const double time = simulator.time();
     const StepReport report = simulator.step(0.02);
@@ -421,24 +435,39 @@ TEST_CASE("hostile: inlets and fills out of range are refused in one line") {
     return inlet;
   };
   const std::vector<InletSettings> wrong{
-      with([](InletSettings& s) { s.position = {0, not_a_number, 0}; }),
-      with([](InletSettings& s) { s.direction = {0, 0, 0}; }),
-      with([](InletSettings& s) { s.direction = {unbounded, 0, 0}; }),
+      with([](InletSettings& s) {
+        s.position = {0, not_a_number, 0};
+      }),
+      with([](InletSettings& s) {
+        s.direction = {0, 0, 0};
+      }),
+      with([](InletSettings& s) {
+        s.direction = {unbounded, 0, 0};
+      }),
       with([](InletSettings& s) { s.radius = 0; }),
       with([](InletSettings& s) { s.radius = -1; }),
       with([](InletSettings& s) { s.radius = not_a_number; }),
       with([](InletSettings& s) { s.radius = 1e9; }),
-      with([](InletSettings& s) { s.flow = {{0, -1e-5}}; }),
-      with([](InletSettings& s) { s.flow = {{0, not_a_number}}; }),
-      with([](InletSettings& s) { s.flow = {{1, 1e-5}, {0, 1e-5}}; }),
-      with([](InletSettings& s) { s.flow = {{not_a_number, 1e-5}}; }),
+      with([](InletSettings& s) {
+        s.flow = {{0, -1e-5}};
+      }),
+      with([](InletSettings& s) {
+        s.flow = {{0, not_a_number}};
+      }),
+      with([](InletSettings& s) {
+        s.flow = {{1, 1e-5}, {0, 1e-5}};
+      }),
+      with([](InletSettings& s) {
+        s.flow = {{not_a_number, 1e-5}};
+      }),
   };
   for (const InletSettings& inlet : wrong) {
     CHECK(refusal([&] { simulator.add_inlet(inlet, 0); }).find("Inlet") != std::string::npos);
   }
-  for (const FillAmount amount : {FillAmount::fraction(-0.1), FillAmount::fraction(1.1), FillAmount::fraction(not_a_number),
-                                  FillAmount::volume(-1), FillAmount::volume(1), FillAmount::volume(not_a_number),
-                                  FillAmount::level(-0.01), FillAmount::level(1), FillAmount::level(not_a_number)}) {
+  for (const FillAmount amount :
+       {FillAmount::fraction(-0.1), FillAmount::fraction(1.1), FillAmount::fraction(not_a_number),
+        FillAmount::volume(-1), FillAmount::volume(1), FillAmount::volume(not_a_number), FillAmount::level(-0.01),
+        FillAmount::level(1), FillAmount::level(not_a_number)}) {
     CHECK(refusal([&] { fill(simulator, 0, amount); }).find("fill: body 'box'") != std::string::npos);
   }
 }

@@ -216,7 +216,8 @@ TEST_CASE("simulator: meshes are looked over when they are added") {
   const Pose over{Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(-1.0), Eigen::Vector3d::UnitX())), {1, 0, 0.2}};
   const BodyId sound = simulator.add_body("sound", glass);
   const BodyId turned = simulator.add_body("turned", glass, PoseTrack(over));
-  const BodyId damaged = simulator.add_body("damaged", torn, PoseTrack(Pose{Eigen::Quaterniond::Identity(), {2, 0, 0}}));
+  const BodyId damaged =
+      simulator.add_body("damaged", torn, PoseTrack(Pose{Eigen::Quaterniond::Identity(), {2, 0, 0}}));
   CHECK(simulator.bodies()[sound].warnings.empty());
   CHECK(simulator.bodies()[turned].warnings.empty());
   REQUIRE(simulator.bodies()[damaged].warnings.size() == 2);
@@ -230,9 +231,10 @@ TEST_CASE("simulator: meshes are looked over when they are added") {
   CHECK(simulator.mesh_report(damaged).warnings[0] == simulator.bodies()[damaged].warnings[0]);
   CHECK_THROWS_WITH(simulator.mesh_report(3), decant_test::contains("body must be one that was added"));
 
-  CHECK_THROWS_WITH(simulator.add_body("cup", scaled(glass, 1000)),
-                    "body 'cup': body is 106 m large, more than 5000 particles of 8 mm: is the file in millimetres (scale "
-                    "0.001)?");
+  CHECK_THROWS_WITH(
+      simulator.add_body("cup", scaled(glass, 1000)),
+      "body 'cup': body is 106 m large, more than 5000 particles of 8 mm: is the file in millimetres (scale "
+      "0.001)?");
   CHECK_THROWS_WITH(simulator.add_body("crumb", scaled(glass, 0.01)), decant_test::contains("body 'crumb'"));
   CHECK(simulator.bodies().size() == 3);
 }

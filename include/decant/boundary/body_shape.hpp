@@ -25,7 +25,8 @@ struct BodyShape {
 
   BodyShape(const Box& box) : mesh(box.mesh()), parts{SolidBox{box.min, box.max}} {}
   BodyShape(const Sphere& sphere) : mesh(sphere.mesh()), parts{SolidSphere{sphere.center, sphere.radius}} {}
-  BodyShape(const Cylinder& cylinder) : mesh(cylinder.mesh()), parts{SolidRing{0, cylinder.radius, 0, cylinder.height}} {}
+  BodyShape(const Cylinder& cylinder)
+      : mesh(cylinder.mesh()), parts{SolidRing{0, cylinder.radius, 0, cylinder.height}} {}
 
   /// Six slabs, or five. Slabs along x reach around the others' edges, so that no gap is left at the corners.
   BodyShape(const BoxInside& room) : mesh(room.mesh()) {

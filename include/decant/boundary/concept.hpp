@@ -40,9 +40,9 @@ struct GuardReport {
 /// add<Kernel>(name, shape, motion, slip, smoothing_length [m], spacing [m], threads): takes one more body and prepares
 /// its wall for this kernel. Returns its number, which is the old size().
 /// size(): the number of bodies.
-/// operator[](body): something with `motion` (PoseTrack) and `bounds` (an AlignedBox3d around the body, in its own frame
-/// [m]; of a wall without end, any box). fill, Contents and watch_contents ask for `name` and `surface` as well, and
-/// mesh_report for `shape`, all as in RigidBodies::Body: without these they do not compile, and everything else does.
+/// operator[](body): something with `motion` (PoseTrack) and `bounds` (an AlignedBox3d around the body, in its own
+/// frame [m]; of a wall without end, any box). fill, Contents and watch_contents ask for `name` and `surface` as well,
+/// and mesh_report for `shape`, all as in RigidBodies::Body: without these they do not compile; everything else does.
 /// set_motion(body, motion): replaces a body's poses. Also the simulator's way to hold a body still.
 /// push_out(body, clearance, fluid): takes particles out of the body's material, `clearance` [m] off its surface, with
 /// the body where the last set_interval put it. Returns how many.
@@ -53,9 +53,9 @@ struct GuardReport {
 /// largest_relative_speed(fluid, threads, reduction) [m/s]: of any particle past any body near it over the interval, or
 /// in the world where nothing moves; NaN if any velocity is. Keeps sub-steps short.
 /// sample(position, spacing [m], threads, walls): sizes and fills every array of `walls`, for bodies at the interval's
-/// start. Where no wall is felt share, gradient, moment, flux and contact_count are 0 and distance is how far walls are felt;
-/// distance may be off by a tenth. share and gradient have to be a function and its derivative, or still water will not
-/// stay still; WallFunction has a pair for plane walls.
+/// start. Where no wall is felt share, gradient, moment, flux and contact_count are 0 and distance is how far walls are
+/// felt; distance may be off by a tenth. share and gradient have to be a function and its derivative, or still water
+/// will not stay still; WallFunction has a pair for plane walls.
 /// separated(a, b, contacts, count): whether a wall stands between two points, of which one has these contacts. Called
 /// from many threads; has to be true of (b, a) where it is of (a, b).
 /// guard(before, time_step, clearance [m], threads, walls, fluid): the end of a sub-step. `walls` is as sampled at

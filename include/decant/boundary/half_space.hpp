@@ -37,15 +37,15 @@ class HalfSpace {
     using KernelScalar = typename Kernel::Scalar;
     const auto weight = [smoothing_length](double r) {
       return 2 * pi * r *
-             static_cast<double>(Kernel::value(static_cast<KernelScalar>(r), static_cast<KernelScalar>(smoothing_length)));
+             static_cast<double>(
+                 Kernel::value(static_cast<KernelScalar>(r), static_cast<KernelScalar>(smoothing_length)));
     };
     const double width = table.support_ / entries;
     for (std::size_t k = entries; k-- > 0;) {
       const double a = static_cast<double>(k) * width;
       const double middle = table.slope_[k + 1] + simpson(weight, a + 0.5 * width, a + width);
       table.slope_[k] = middle + simpson(weight, a, a + 0.5 * width);
-      table.fraction_[k] =
-          table.fraction_[k + 1] + width / 6 * (table.slope_[k] + 4 * middle + table.slope_[k + 1]);
+      table.fraction_[k] = table.fraction_[k + 1] + width / 6 * (table.slope_[k] + 4 * middle + table.slope_[k + 1]);
     }
     // Single precision kernels integrate to one within their rounding; make the table exactly odd about the plane.
     const double scale = 0.5 / table.fraction_[0];

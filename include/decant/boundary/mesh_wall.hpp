@@ -22,8 +22,8 @@
 namespace decant {
 
 /// What lies in the shadow of a mesh: the integral of the wall's weight (WallFunction) over all points that the surface
-/// hides from the particle. Along a ray in direction u that meets the surface at distance t, the radial part is known in
-/// closed form, so only directions are summed:
+/// hides from the particle. Along a ray in direction u that meets the surface at distance t, the radial part is known
+/// in closed form, so only directions are summed:
 ///   share    = int du G(t),     G(t) = int_t^R w s^2 ds   = (share_plane(t) + t slope_plane(t)) / 2 pi
 ///   gradient = int du u K(t),   K(t) = -int_t^R w' s^2 ds = t^2 w(t) + slope_plane(t) / pi
 ///   moment   = int du K(t) t (u.n)^2 n n^T,   n the surface's normal where the ray meets it
@@ -63,7 +63,8 @@ class MeshWall {
       cell[at] = static_cast<int>(place);
       t[axis] = place - cell[at];
     }
-    const std::int32_t block = block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
+    const std::int32_t block =
+        block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
     if (block < 0) {
       return false;
     }
@@ -122,9 +123,9 @@ class MeshWall {
   static constexpr int block_nodes = block_cells + 1;
 
   /// Eight cells a side; border nodes are stored in both blocks, so that a look-up stays within one.
-  /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, the true
-  /// distance, and the moment over that slope (xx, xy, xz, yy, yz, zz). Near a plane all of these are linear or constant in space, so interpolation is exact there, although
-  /// the share itself is steep.
+  /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, the
+  /// true distance, and the moment over that slope (xx, xy, xz, yy, yz, zz). Near a plane all of these are linear or
+  /// constant in space, so interpolation is exact there, although the share itself is steep.
   using NodeValues = Eigen::Matrix<double, 11, 1>;
   using StoredValues = Eigen::Matrix<float, 11, 1>;
   struct Block {

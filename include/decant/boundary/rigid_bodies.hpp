@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// The rigid bodies of a scene: what they are made of, where they are, what the liquid feels of them, and the guard that
-/// keeps the liquid on its side of their walls.
+/// The rigid bodies of a scene: what they are made of, where they are, what the liquid feels of them, and the guard
+/// that keeps the liquid on its side of their walls.
 
 #include <algorithm>
 #include <array>
@@ -50,18 +50,19 @@ class RigidBodies {
     std::shared_ptr<const std::variant<MeshWallType, SolidParts>> wall{};
     PoseTrack motion{};
     Slip slip = Slip::free;
-    Eigen::AlignedBox3d bounds{};  ///< in the body's frame [m]
+    Eigen::AlignedBox3d bounds{};         ///< in the body's frame [m]
     std::vector<std::string> warnings{};  ///< what is wrong with its mesh, one line each (boundary/mesh_report.hpp)
-    Pose before{}, after{};        ///< at the ends of the current step
-    RigidVelocity velocity{};      ///< between them
-    double reach = 0;              ///< the farthest that any point of the body moves between them [m]
-    Eigen::Isometry3d from_world_before = Eigen::Isometry3d::Identity();  ///< inverse of `before`, ready for many points
+    Pose before{}, after{};               ///< at the ends of the current step
+    RigidVelocity velocity{};             ///< between them
+    double reach = 0;                     ///< the farthest that any point of the body moves between them [m]
+    Eigen::Isometry3d from_world_before =
+        Eigen::Isometry3d::Identity();  ///< inverse of `before`, ready for many points
     Eigen::Isometry3d from_world_after = Eigen::Isometry3d::Identity();
   };
 
   /// Wall integrals are prepared for the kernel and particle spacing that are given. The number that is returned counts
-  /// up from 0. A mesh is looked over first: throws std::invalid_argument, one line, if it is empty, not finite, or of a
-  /// size that makes no sense at this spacing; what else is wrong with it is in the body's warnings.
+  /// up from 0. A mesh is looked over first: throws std::invalid_argument, one line, if it is empty, not finite, or of
+  /// a size that makes no sense at this spacing; what else is wrong with it is in the body's warnings.
   template <class Kernel>
   BodyId add(std::string name, BodyShape shape, PoseTrack motion, Slip slip, double smoothing_length, double spacing,
              Threads threads) {
@@ -175,7 +176,8 @@ class RigidBodies {
         continue;
       }
       if (const auto near = body.surface->closest_point(x, body.bounds.diagonal().norm())) {
-        const Vector3<double> out = near->distance > 1e-12 ? Vector3<double>((near->point - x) / near->distance) : near->normal;
+        const Vector3<double> out =
+            near->distance > 1e-12 ? Vector3<double>((near->point - x) / near->distance) : near->normal;
         fluid.position.col(i) = (body.before * (near->point + clearance * out)).template cast<Scalar>();
         fluid.velocity.col(i).setZero();
         ++moved;
@@ -195,10 +197,17 @@ class RigidBodies {
     std::atomic<Index> slid{0}, stopped{0}, lost{0};
     parallel_for(before.cols(), threads, [&](Index i) {
       switch (guard_particle(i, before, time_step, clearance, walls, fluid)) {
-        case Outcome::free: break;
-        case Outcome::slid: slid.fetch_add(1, std::memory_order_relaxed); break;
-        case Outcome::stopped: stopped.fetch_add(1, std::memory_order_relaxed); break;
-        case Outcome::lost: lost.fetch_add(1, std::memory_order_relaxed); break;
+        case Outcome::free:
+          break;
+        case Outcome::slid:
+          slid.fetch_add(1, std::memory_order_relaxed);
+          break;
+        case Outcome::stopped:
+          stopped.fetch_add(1, std::memory_order_relaxed);
+          break;
+        case Outcome::lost:
+          lost.fetch_add(1, std::memory_order_relaxed);
+          break;
       }
     });
     return {slid, stopped, lost};
@@ -227,8 +236,7 @@ class RigidBodies {
     return result;
   }
 
-  void sample_particle(Index i, const Vector3<Scalar>& place, double spacing,
-                       WallState<Scalar>& walls) const noexcept {
+  void sample_particle(Index i, const Vector3<Scalar>& place, double spacing, WallState<Scalar>& walls) const noexcept {
     const Vector3<double> x = place.template cast<double>();
     std::array<Share, WallState<Scalar>::max_contacts> near;
     std::size_t count = 0;
@@ -293,8 +301,8 @@ class RigidBodies {
       contact.body = near[k].body;
       contact.gradient = share.template cast<Scalar>();
       contact.velocity = velocity.template cast<Scalar>();
-      // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own layer
-      // and the quotient would only measure rounding.
+      // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own
+      // layer and the quotient would only measure rounding.
       const double distance = std::max(near[k].distance, 0.25 * spacing);
       contact.friction = body.slip == Slip::free
                              ? Scalar(0)
@@ -335,8 +343,8 @@ class RigidBodies {
         if (room > 0 && step.squaredNorm() < room * room) {
           continue;
         }
-        if (!body.bounds.intersects(
-                Eigen::AlignedBox3d(start.cwiseMin(end).array() - clearance, start.cwiseMax(end).array() + clearance))) {
+        if (!body.bounds.intersects(Eigen::AlignedBox3d(start.cwiseMin(end).array() - clearance,
+                                                        start.cwiseMax(end).array() + clearance))) {
           continue;
         }
         const SweptResult result = keep_on_side(*body.surface, start, end, clearance);

@@ -23,10 +23,10 @@ namespace decant {
 /// (ACM TOG 31): the surface is covered with boundary particles b, and with volumes V_b = 1 / sum_c W(x_b - x_c), which
 /// even out a coverage that is not uniform,
 ///   fraction = sum_b V_b W(x - x_b),     gradient = sum_b V_b grad W(x - x_b).
-/// One layer stands for the wall whatever its thickness. What differs from MeshWall: the fraction is that of a layer, not
-/// of the space behind it, so it falls off again behind the surface, a thin wall is felt from both sides (with the
-/// gradient towards the surface on either), and corners and flat parts differ by the unevenness of the cover, some 6 per
-/// cent. Memory grows with the area only. Kept for comparison with other codes; MeshWall is more accurate.
+/// One layer stands for the wall whatever its thickness. What differs from MeshWall: the fraction is that of a layer,
+/// not of the space behind it, so it falls off again behind the surface, a thin wall is felt from both sides (with the
+/// gradient towards the surface on either), and corners and flat parts differ by the unevenness of the cover, some 6
+/// per cent. Memory grows with the area only. Kept for comparison with other codes; MeshWall is more accurate.
 /// Immutable after construction; refers to the hierarchy, which it does not own.
 class SampledWall {
  public:
@@ -121,7 +121,8 @@ class SampledWall {
     surface_->for_each_triangle([&](const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c) {
       const double area = 0.5 * (b - a).cross(c - a).norm();
       owed += candidates_per_square * area / (least * least);
-      expects(owed < 1e8, "SampledWall: area of a triangle over the spacing squared", "below 4e6", area / (least * least));
+      expects(owed < 1e8, "SampledWall: area of a triangle over the spacing squared", "below 4e6",
+              area / (least * least));
       for (; owed >= 1; owed -= 1, ++number) {
         // the R2 sequence (Roberts 2018), folded onto the triangle
         double u = fraction_of(0.5 + 0.7548776662466927 * static_cast<double>(number));

@@ -15,11 +15,11 @@ enum class SweptResult {
   stopped,  ///< no free end was found nearby: the particle stays where it was, relative to the body
 };
 
-/// Moves `end` so that the straight path from `start` to it, both in the body's frame, does not cross the surface, and so
-/// that it ends at least `clearance` [m] away from it where there is room. Both frames' motion is in the two points: for a
-/// moving body, `start` is taken with the pose before the step and `end` with the pose after it.
-/// By induction a particle that started on one side of a closed surface stays there: whatever is returned has been
-/// tested against the surface, and the last resort is `start` itself.
+/// Moves `end` so that the straight path from `start` to it, both in the body's frame, does not cross the surface, and
+/// so that it ends at least `clearance` [m] away from it where there is room. Both frames' motion is in the two points:
+/// for a moving body, `start` is taken with the pose before the step and `end` with the pose after it. By induction a
+/// particle that started on one side of a closed surface stays there: whatever is returned has been tested against the
+/// surface, and the last resort is `start` itself.
 inline SweptResult keep_on_side(const BoundingVolumeHierarchy& surface, const Vector3<double>& start,
                                 Vector3<double>& end, double clearance) noexcept {
   constexpr int most_slides = 4;  // a corner of three walls takes three

@@ -13,7 +13,7 @@ namespace decant {
 
 /// Where a point falls in an image.
 struct Projection {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< (u, v) [px], u right, v down, (0, 0) the top left pixel's centre
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< (u, v) [px], u right, v down, (0, 0) is the top left pixel
   double depth = 0;                                 ///< along the optical axis [m]
   bool visible = false;  ///< before the camera and inside the image; walls are not asked, see camera/ray_occlusion.hpp
 };

@@ -465,7 +465,9 @@ struct Batch4 {
 template <std::floating_point Scalar>
 [[gnu::always_inline]] inline Batch4<Scalar> gather4(const Scalar* records4, const std::uint32_t* index) noexcept {
   using B = Batch<Scalar>;
-  const auto record = [&](int k) __attribute__((always_inline)) { return records4 + 4 * static_cast<std::size_t>(index[k]); };
+  const auto record = [&](int k) __attribute__((always_inline)) {
+    return records4 + 4 * static_cast<std::size_t>(index[k]);
+  };
 #if defined(__AVX512F__) && defined(__AVX512VL__) && defined(__AVX512DQ__)
   if constexpr (B::width == 16) {
     // Rows hold the records k, k+4, k+8, k+12; turning each 4x4 quarter then leaves the lanes in their natural order.

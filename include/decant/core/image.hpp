@@ -14,8 +14,8 @@ namespace decant {
 template <class T>
 using Image = Eigen::Array<T, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// Pixels that somebody else owns, to read: an Image, a block of one, or an Eigen::Map of a camera driver's buffer. A row
-/// may be followed by padding. What is not stored row by row is copied.
+/// Pixels that somebody else owns, to read: an Image, a block of one, or an Eigen::Map of a camera driver's buffer. A
+/// row may be followed by padding. What is not stored row by row is copied.
 template <class T>
 using ConstImageView = Eigen::Ref<const Image<T>, 0, Eigen::OuterStride<>>;
 

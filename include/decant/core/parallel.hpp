@@ -31,7 +31,8 @@ struct Threads {
   }
 };
 
-/// Loops over fewer entries per thread than this are not shared out (but for a grain of 1, which says that one is much).
+/// Loops over fewer entries per thread than this are not shared out (but for a grain of 1, which says that one is
+/// much).
 inline constexpr Index least_per_thread = 512;
 
 /// Calls f(begin, end) for consecutive ranges that cover [0, count). Ranges are of `grain` entries (the last may be

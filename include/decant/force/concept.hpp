@@ -12,11 +12,11 @@ namespace decant {
 
 /// An acceleration of the liquid other than pressure. A plain value: settings inside, defaults for everything.
 /// accumulate(step, acceleration): adds the term's acceleration [m/s^2] to each column of `acceleration`, 3xN, and
-/// overwrites nothing. step is a StepView; velocities in it are those before the sub-step (but see below). Called once per sub-step, from
-/// one thread; it may run loops with step.threads, must give the same bits for any number of them, must not throw, and
-/// allocates only when the number of particles grows (scratch memory belongs to the term).
-/// A term with `static constexpr bool acts_after_pressure = true` is called when the pressure has acted, sees the velocities
-/// and pressures that this has left, and has the last word.
+/// overwrites nothing. step is a StepView; velocities in it are those before the sub-step (but see below). Called once
+/// per sub-step, from one thread; it may run loops with step.threads, must give the same bits for any number of them,
+/// must not throw, and allocates only when the number of particles grows (scratch memory belongs to the term).
+/// A term with `static constexpr bool acts_after_pressure = true` is called when the pressure has acted, sees the
+/// velocities and pressures that this has left, and has the last word.
 /// largest_step(step) [s]: the longest sub-step that the term integrates stably, infinity where it has no limit.
 /// Laws (decant/testing/force.hpp): adds; the same for 1, 2 and 4 threads; liquid at rest without gravity gains no
 /// momentum.

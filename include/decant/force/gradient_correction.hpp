@@ -16,11 +16,11 @@ namespace decant {
 
 /// One symmetric matrix L_i per particle, close to the inverse of
 ///   A_i = sum_j V_j (-W'/r) r r^T + sum over walls of |grad s| a n n^T,    r = x_i - x_j
-/// with the volumes V_j = m_j / rho_0 and, for each face of a wall, its distance a, its normal n and the gradient of its
-/// share s (boundary/wall_function.hpp). sum_j V_j (v_j - v_i) . L_i grad W_ij is then the divergence of a linear
+/// with the volumes V_j = m_j / rho_0 and, for each face of a wall, its distance a, its normal n and the gradient of
+/// its share s (boundary/wall_function.hpp). sum_j V_j (v_j - v_i) . L_i grad W_ij is then the divergence of a linear
 /// velocity field exactly (Bonet and Lok 1999, "Variational and momentum preservation aspects of SPH formulations",
-/// CMAME 180). Uncorrected, a liquid of disordered particles takes shear for compression: its pressure then resists shear,
-/// waves run too fast and die within a few periods.
+/// CMAME 180). Uncorrected, a liquid of disordered particles takes shear for compression: its pressure then resists
+/// shear, waves run too fast and die within a few periods.
 ///
 /// With E = 1 - A the inverse is cut short to (1 + E)(1 + E^2) = A^-1 (1 - E^4): exact to a few per mille inside of a
 /// disordered liquid, and at most 4 where a particle has hardly any neighbours and no inverse exists.
@@ -56,7 +56,8 @@ class GradientCorrection {
       moment << sum(xx), sum(xy), sum(xz), sum(xy), sum(yy), sum(yz), sum(xz), sum(yz), sum(zz);
       moment /= -step.rest_density;
       const auto wall = step.walls.moment.col(i);
-      moment += (Matrix3() << wall[0], wall[1], wall[2], wall[1], wall[3], wall[4], wall[2], wall[4], wall[5]).finished();
+      moment +=
+          (Matrix3() << wall[0], wall[1], wall[2], wall[1], wall[3], wall[4], wall[2], wall[4], wall[5]).finished();
       set(i, shortened_inverse(moment));
     });
   }
@@ -71,8 +72,8 @@ class GradientCorrection {
             a[2] * g[0] + b[1] * g[1] + b[2] * g[2]};
   }
 
-  /// The part of L_i times a wall's gradient that is along that gradient: pressure must not pull liquid along a wall, nor a
-  /// wall that slides by compress it.
+  /// The part of L_i times a wall's gradient that is along that gradient: pressure must not pull liquid along a wall,
+  /// nor a wall that slides by compress it.
   Vector3<Scalar> at_wall(Index i, const Vector3<Scalar>& g) const noexcept {
     const Scalar squared = g.squaredNorm();
     return squared > 0 ? Vector3<Scalar>(g.dot(apply(i, g)) / squared * g) : g;

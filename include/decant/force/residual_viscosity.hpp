@@ -22,14 +22,14 @@ namespace decant {
 ///   a_i = 10 nu sum_j (m_j / rho_0) (e_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij,   e_ij = v_ij - (G_i + G_j) x_ij / 2
 /// with the velocity gradients G_i = sum_j V_j (v_j - v_i) (L_i grad W_ij)^T and the corrected kernel gradients of
 /// GradientCorrection. Jitter from particle to particle is damped as by a viscosity nu, a wave of wave number k by
-/// (k d)^2 less: the idea of limiting artificial viscosity by a linear reconstruction is from Frontiere, Raskin and Owen
-/// 2017, "CRKSPH" (J. Comput. Phys. 332). The force acts along the line between two particles, so linear and angular
-/// momentum are kept to rounding.
-/// Pressure p holds particles in place with the stiffness p / (rho_0 d^2), and the deeper the liquid the more jitter that
-/// makes: of a pair, nu is the mean of
+/// (k d)^2 less: the idea of limiting artificial viscosity by a linear reconstruction is from Frontiere, Raskin and
+/// Owen 2017, "CRKSPH" (J. Comput. Phys. 332). The force acts along the line between two particles, so linear and
+/// angular momentum are kept to rounding. Pressure p holds particles in place with the stiffness p / (rho_0 d^2), and
+/// the deeper the liquid the more jitter that makes: of a pair, nu is the mean of
 ///   nu_i = max(numerical_viscosity, pressure_share d sqrt(p_i / rho_0)),   at most what an explicit sub-step stands.
 /// It acts after the pressure. Before it, the velocities by which particles are moved would still contain what pressure
-/// has just done to them: x'' = -w^2 x is then overshot beyond w dt = sqrt(2) where friction is strong, and never after it.
+/// has just done to them: x'' = -w^2 x is then overshot beyond w dt = sqrt(2) where friction is strong, and never after
+/// it.
 template <class ScalarType>
 struct ResidualViscosity {
   using Scalar = ScalarType;
@@ -156,9 +156,9 @@ struct ResidualViscosity {
     });
   }
 
-  std::vector<Scalar> viscosity_{};                 ///< nu of each particle
-  std::vector<Scalar> velocity_{};                  ///< records of four, the last one unused
-  std::array<std::vector<Scalar>, 3> gradient_{};   ///< row by row of G, records of four
+  std::vector<Scalar> viscosity_{};                ///< nu of each particle
+  std::vector<Scalar> velocity_{};                 ///< records of four, the last one unused
+  std::array<std::vector<Scalar>, 3> gradient_{};  ///< row by row of G, records of four
 };
 
 }  // namespace decant

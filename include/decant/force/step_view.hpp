@@ -20,16 +20,16 @@ struct StepView {
   using Scalar = typename Kernel::Scalar;
 
   FluidState<Scalar>& fluid;
-  const Neighbors& neighbors;         ///< pairs within the support radius, without those that a wall separates
+  const Neighbors& neighbors;  ///< pairs within the support radius, without those that a wall separates
   const WallState<Scalar>& walls;
   const GradientCorrection<Scalar>& correction;  ///< empty unless a part has `uses_gradient_correction = true`
-  Growable<Scalar, 3>& shift;         ///< 3xN, moved at the end of the sub-step beside time_step * velocity [m]; zero at
-                                      ///< its start. For pressure solvers that correct places without adding speed.
-  Scalar smoothing_length = 0;        ///< h [m]
-  Scalar spacing = 0;                 ///< particle spacing d [m]
-  Scalar rest_density = 0;            ///< [kg/m^3]
-  Scalar time_step = 0;               ///< [s]; 0 before it has been chosen
-  double time = 0;                    ///< [s]
+  Growable<Scalar, 3>& shift;   ///< 3xN, moved at the end of the sub-step beside time_step * velocity [m]; zero at
+                                ///< its start. For pressure solvers that correct places without adding speed.
+  Scalar smoothing_length = 0;  ///< h [m]
+  Scalar spacing = 0;           ///< particle spacing d [m]
+  Scalar rest_density = 0;      ///< [kg/m^3]
+  Scalar time_step = 0;         ///< [s]; 0 before it has been chosen
+  double time = 0;              ///< [s]
   Threads threads{};
 };
 

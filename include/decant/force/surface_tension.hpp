@@ -17,20 +17,20 @@
 
 namespace decant {
 
-/// The gradient of the liquid's volume fraction, n_i = sum_j V_j grad W_ij + wall share (V = m / rho_0), points into the
-/// liquid, is large at the surface only, and its length integrates to one across it. Tension is a stress along the
+/// The gradient of the liquid's volume fraction, n_i = sum_j V_j grad W_ij + wall share (V = m / rho_0), points into
+/// the liquid, is large at the surface only, and its length integrates to one across it. Tension is a stress along the
 /// surface, sigma |n| (1 - nn) with the unit normal nn (Lafaurie et al. 1994, J. Comput. Phys. 113). We let each pair
 /// carry its share of that stress along the line between the two,
 ///   a_i = (2 sigma / rho_0^2) sum_j m_j (q_ij + q_ji) (-W'(r)) (x_j - x_i) / r,
 ///   q_ij = |n_i| (cohesion - (nn_i . x_ij / r)^2),
-/// so that pairs along the surface attract, pairs across it do not, and linear and angular momentum are kept to rounding.
-/// An isotropic part of the stress is only felt as pressure; `cohesion` chooses it. At 0.8 the pressure inside a drop at
-/// rest is the analytic 2 sigma / R within 4 % (radius 6 and 9 spacings, cubic spline, Dfsph). Forces of this kind are not the derivative of an energy and would feed the noise of the surface
-/// particles, so pairs at the surface are damped as well, by a friction that scales with sqrt(sigma h / rho_0) and acts
-/// in a layer of about h: it vanishes as the spacing does. It does not take out all: a drop that oscillates keeps noise
-/// of some 0.1 sqrt(sigma / (rho_0 R)) in its velocities and its lowest mode is slower than Lamb's.
-/// Walls complete the support: no surface between liquid and wall, and liquid meets a wall at about a right angle.
-/// A tension of zero costs nothing.
+/// so that pairs along the surface attract, pairs across it do not, and linear and angular momentum are kept to
+/// rounding. An isotropic part of the stress is only felt as pressure; `cohesion` chooses it. At 0.8 the pressure
+/// inside a drop at rest is the analytic 2 sigma / R within 4 % (radius 6 and 9 spacings, cubic spline, Dfsph). Forces
+/// of this kind are not the derivative of an energy and would feed the noise of the surface particles, so pairs at the
+/// surface are damped as well, by a friction that scales with sqrt(sigma h / rho_0) and acts in a layer of about h: it
+/// vanishes as the spacing does. It does not take out all: a drop that oscillates keeps noise of some 0.1 sqrt(sigma /
+/// (rho_0 R)) in its velocities and its lowest mode is slower than Lamb's. Walls complete the support: no surface
+/// between liquid and wall, and liquid meets a wall at about a right angle. A tension of zero costs nothing.
 template <class ScalarType>
 struct SurfaceTension {
   using Scalar = ScalarType;

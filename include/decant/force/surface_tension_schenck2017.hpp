@@ -16,13 +16,13 @@
 namespace decant {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS), after Mueller et al. 2003, section
-/// 3.3: the colour field c = sum_j V_j W_ij is one in the liquid and zero outside, its gradient n points into the liquid,
-/// its Laplacian over |n| is the curvature, and
+/// 3.3: the colour field c = sum_j V_j W_ij is one in the liquid and zero outside, its gradient n points into the
+/// liquid, its Laplacian over |n| is the curvature, and
 ///   a_i = -(sigma / rho_i) (Laplacian c) n / |n|    where |n| exceeds a threshold, else 0.
 /// The threshold is there because n / |n| is noise inside the liquid. What differs from SurfaceTension: forces are not
 /// mutual, so a free drop gains momentum and drifts; the sum over a support that is cut off at the surface takes flat
-/// surfaces for curved, so the pull is of the right direction but not of the right size. Walls count as liquid in n only.
-/// Kept for comparison with the paper; take SurfaceTension for anything else.
+/// surfaces for curved, so the pull is of the right direction but not of the right size. Walls count as liquid in n
+/// only. Kept for comparison with the paper; take SurfaceTension for anything else.
 template <class ScalarType>
 struct SurfaceTensionSchenck2017 {
   using Scalar = ScalarType;
@@ -42,9 +42,8 @@ struct SurfaceTensionSchenck2017 {
     const Scalar h = step.smoothing_length;
     const Scalar threshold = normal_threshold / (static_cast<Scalar>(Kernel::support_factor) * h);
     volume_.resize(static_cast<std::size_t>(count));
-    parallel_for(count, step.threads, [&](Index i) {
-      volume_[static_cast<std::size_t>(i)] = step.fluid.mass[i] / step.fluid.density[i];
-    });
+    parallel_for(count, step.threads,
+                 [&](Index i) { volume_[static_cast<std::size_t>(i)] = step.fluid.mass[i] / step.fluid.density[i]; });
     parallel_for(count, step.threads, [&](Index i) {
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0)), bend(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
@@ -82,8 +81,9 @@ struct SurfaceTensionSchenck2017 {
     using B = Batch<Scalar>;
     const Scalar width = Scalar(0.01) * h;
     const B near = maximum(r, B(2 * width));
-    const B change = (Kernel::derivative_over_radius(near + width, h) - Kernel::derivative_over_radius(near - width, h)) /
-                     (2 * width);
+    const B change =
+        (Kernel::derivative_over_radius(near + width, h) - Kernel::derivative_over_radius(near - width, h)) /
+        (2 * width);
     return 3 * Kernel::derivative_over_radius(r, h) + r * change;
   }
 

@@ -15,13 +15,13 @@
 namespace decant {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS): velocities enter as the sum
-/// v_i / rho_i^2 + v_j / rho_j^2 where friction needs their difference. With the Laplacian of Mueller's viscosity kernel
-/// (Mueller et al. 2003, positive everywhere) and the sign that takes energy away,
+/// v_i / rho_i^2 + v_j / rho_j^2 where friction needs their difference. With the Laplacian of Mueller's viscosity
+/// kernel (Mueller et al. 2003, positive everywhere) and the sign that takes energy away,
 ///   a_i = -mu sum_j m_j (v_i / rho_i^2 + v_j / rho_j^2) Laplacian W_ij.
 /// What differs from friction: liquid that moves all together is braked as well, relative to the frame that velocities
 /// are measured in, so neither linear nor angular momentum is kept; a falling drop slows down without air. In the bulk
-/// that rate is about 2 nu * 15 / (2 H^2) per second, with the support radius H. Kept for comparison with the paper; take
-/// Viscosity for anything else.
+/// that rate is about 2 nu * 15 / (2 H^2) per second, with the support radius H. Kept for comparison with the paper;
+/// take Viscosity for anything else.
 template <class ScalarType>
 struct ViscositySchenck2017 {
   using Scalar = ScalarType;
@@ -51,9 +51,9 @@ struct ViscositySchenck2017 {
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
         const auto other = gather4(records_.data(), pair.neighbor);
         // the places that fill up a row hold the particle itself, which is no neighbour
-        const B weight = select(pair.valid,
-                                other.w * MuellerViscosity<Scalar>::laplacian(square_root(pair.distance_squared), h),
-                                B(Scalar(0)));
+        const B weight =
+            select(pair.valid, other.w * MuellerViscosity<Scalar>::laplacian(square_root(pair.distance_squared), h),
+                   B(Scalar(0)));
         x = multiply_add(weight, own[0] + other.x, x);
         y = multiply_add(weight, own[1] + other.y, y);
         z = multiply_add(weight, own[2] + other.z, z);
@@ -67,8 +67,8 @@ struct ViscositySchenck2017 {
     if (!(kinematic_viscosity > 0)) {
       return std::numeric_limits<Scalar>::infinity();
     }
-    // Uniform motion is what is braked fastest, at 2 nu sum_j V_j Laplacian W_ij, whose integral is 15 / H^2. The quarter
-    // leaves room for density above that of rest.
+    // Uniform motion is what is braked fastest, at 2 nu sum_j V_j Laplacian W_ij, whose integral is 15 / H^2. The
+    // quarter leaves room for density above that of rest.
     const Scalar support = static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length;
     return Scalar(0.5) * support * support / (30 * kinematic_viscosity);
   }

@@ -19,14 +19,15 @@ namespace decant {
 
 /// After Weiler, Koschier, Brand and Bender 2018, "A physically consistent implicit viscosity solver for SPH fluids"
 /// (Computer Graphics Forum 37): the pair friction of Viscosity, evaluated at the velocities that it leads to,
-///   v' = v + dt a(v'),   a_i(v) = 10 nu sum_j (m_j / rho_0) (v_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij - wall friction,
-/// solved by conjugate gradients; what is added is (v' - v) / dt. Walls that hold the liquid enter by their friction rate
-/// and velocity (WallContact), where the paper uses boundary particles.
-/// Two things differ from the paper. rho_0 stands for rho_j, as in Viscosity. And there is no preconditioner: in the
-/// product weighted by mass the system is symmetric, translations and rotations of the whole are eigenvectors of
-/// eigenvalue one, and plain conjugate gradients never leave the space orthogonal to what they start from, so that linear
-/// and angular momentum are kept to rounding however early the iteration ends. A block Jacobi preconditioner would lose
-/// that and, with particles of one size, save few iterations.
+///   v' = v + dt a(v'),   a_i(v) = 10 nu sum_j (m_j / rho_0) (v_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij - wall
+///   friction,
+/// solved by conjugate gradients; what is added is (v' - v) / dt. Walls that hold the liquid enter by their friction
+/// rate and velocity (WallContact), where the paper uses boundary particles. Two things differ from the paper. rho_0
+/// stands for rho_j, as in Viscosity. And there is no preconditioner: in the product weighted by mass the system is
+/// symmetric, translations and rotations of the whole are eigenvectors of eigenvalue one, and plain conjugate gradients
+/// never leave the space orthogonal to what they start from, so that linear and angular momentum are kept to rounding
+/// however early the iteration ends. A block Jacobi preconditioner would lose that and, with particles of one size,
+/// save few iterations.
 template <class ScalarType>
 struct ViscosityWeiler2018 {
   using Scalar = ScalarType;
@@ -58,7 +59,8 @@ struct ViscosityWeiler2018 {
             for (Index i = from; i < to; ++i) {
               const Vector3<Scalar> image = apply(step, direction_.data(), i);
               image_.col(i) = image;
-              partial += static_cast<double>(step.fluid.mass[i]) * static_cast<double>(image.dot(vector(direction_, i)));
+              partial +=
+                  static_cast<double>(step.fluid.mass[i]) * static_cast<double>(image.dot(vector(direction_, i)));
             }
             return partial;
           },
@@ -81,9 +83,8 @@ struct ViscosityWeiler2018 {
           [](double a, double b) { return a + b; });
       const Scalar keep = static_cast<Scalar>(next / squared_residual);
       squared_residual = next;
-      parallel_for(count, step.threads, [&](Index i) {
-        set(direction_, i, residual_.col(i) + keep * vector(direction_, i));
-      });
+      parallel_for(count, step.threads,
+                   [&](Index i) { set(direction_, i, residual_.col(i) + keep * vector(direction_, i)); });
     }
     const Scalar rate = 1 / step.time_step;
     parallel_for(count, step.threads, [&](Index i) { acceleration.col(i) += rate * change_.col(i); });
@@ -108,8 +109,8 @@ struct ViscosityWeiler2018 {
     record[2] = value[2];
   }
 
-  /// Per pair w = nu dt / rho_0 * ViscousPair >= 0, so that the friction is dt a_i = -sum_j m_j w (v_ij . x_ij) x_ij; it is
-  /// the same for all iterations. Positions come with the list.
+  /// Per pair w = nu dt / rho_0 * ViscousPair >= 0, so that the friction is dt a_i = -sum_j m_j w (v_ij . x_ij) x_ij;
+  /// it is the same for all iterations. Positions come with the list.
   template <class Step>
   void assemble(const Step& step) noexcept {
     using Kernel = typename Step::Kernel;

@@ -16,13 +16,13 @@
 
 namespace decant {
 
-/// A sweep over neighbours carries information by one support radius, so that a deep column takes as many sweeps as it has
-/// layers. This finds in one go the best pressure that is constant within cells: with the matrix A of a PressureSystem and
-/// the indicator Z of the cells over the particles in contact,
+/// A sweep over neighbours carries information by one support radius, so that a deep column takes as many sweeps as it
+/// has layers. This finds in one go the best pressure that is constant within cells: with the matrix A of a
+/// PressureSystem and the indicator Z of the cells over the particles in contact,
 ///   z = Z (Z^T A Z)^-1 Z^T r
-/// which is the coarse half of a two-level preconditioner (deflation: Nicolaides 1987, SIAM J. Numer. Anal. 24). Z^T A Z is
-/// the exact product, summed from what each particle feels of its cells, and factorized within its profile; there are at
-/// most some two thousand cells, which are made larger for more liquid.
+/// which is the coarse half of a two-level preconditioner (deflation: Nicolaides 1987, SIAM J. Numer. Anal. 24). Z^T A
+/// Z is the exact product, summed from what each particle feels of its cells, and factorized within its profile; there
+/// are at most some two thousand cells, which are made larger for more liquid.
 template <class ScalarType>
 class CoarseCells {
  public:
@@ -56,8 +56,8 @@ class CoarseCells {
 
   std::size_t cells() const noexcept { return keys_.size(); }
 
-  /// Takes r: sums it over each cell's particles with contact[i] == 1 (else 0). @return sum over cells of what came out,
-  /// without its sign.
+  /// Takes r: sums it over each cell's particles with contact[i] == 1 (else 0). @return sum over cells of what came
+  /// out, without its sign.
   double restrict(const std::vector<Scalar>& residual, const std::vector<Scalar>& contact, Threads threads) noexcept {
     const Index cells_per_range = 16;
     parallel_ranges(static_cast<Index>(value_.size()), threads, cells_per_range, [&](Index begin, Index end) {
@@ -264,9 +264,9 @@ class CoarseCells {
     }
   }
 
-  std::vector<std::uint64_t> keys_{}, key_{};                   ///< of all cells, in order; of each particle's
-  std::vector<std::uint32_t> cell_{};                           ///< of each particle
-  std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};    ///< the particles of each cell
+  std::vector<std::uint64_t> keys_{}, key_{};                 ///< of all cells, in order; of each particle's
+  std::vector<std::uint32_t> cell_{};                         ///< of each particle
+  std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};  ///< the particles of each cell
   std::vector<Felt> felt_{};
   std::vector<std::uint32_t> first_{};
   std::vector<std::size_t> row_{};  ///< where column 0 of each row would be

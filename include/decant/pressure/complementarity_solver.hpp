@@ -17,17 +17,17 @@ namespace decant {
 
 /// How a solve went.
 struct ComplementarityReport {
-  int iterations = 0;      ///< evaluations of the system
-  double error = 0;        ///< mean of what is amiss, over rest density [-]
+  int iterations = 0;  ///< evaluations of the system
+  double error = 0;    ///< mean of what is amiss, over rest density [-]
   bool converged = false;
 };
 
 /// Finds P >= 0 for a PressureSystem such that
 ///   r = offset + dt^2 D(a(P)) <= 0,   and r = 0 wherever P > 0
-/// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients over the particles
-/// that are in contact (P > 0 or r > 0), preconditioned by the diagonal plus, where whole regions are amiss, CoarseCells.
-/// Where pressures have become negative or particles have come into contact, these are set to zero and those taken in
-/// every few steps, and the directions start over.
+/// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients over the
+/// particles that are in contact (P > 0 or r > 0), preconditioned by the diagonal plus, where whole regions are amiss,
+/// CoarseCells. Where pressures have become negative or particles have come into contact, these are set to zero and
+/// those taken in every few steps, and the directions start over.
 template <class ScalarType>
 class ComplementaritySolver {
  public:
@@ -35,10 +35,10 @@ class ComplementaritySolver {
 
   double mean_tolerance = 1e-3;     ///< mean of what may be left amiss, over rest density [-], > 0
   double largest_tolerance = 3e-3;  ///< for any one particle [-], > 0
-  /// Of mean_tolerance, for what cells of particles are compressed as a whole: what is left in a region adds up over its
-  /// depth, and eighty layers that each give way by 1e-4 a sub-step fall through themselves.
+  /// Of mean_tolerance, for what cells of particles are compressed as a whole: what is left in a region adds up over
+  /// its depth, and eighty layers that each give way by 1e-4 a sub-step fall through themselves.
   double net_share = 0.3;
-  int most_iterations = 100;        ///< >= 1
+  int most_iterations = 100;  ///< >= 1
 
   /// Forgets the places of particles; call once per sub-step, before the first solve.
   void begin_step() noexcept { sorted_ = assembled_ = false; }
@@ -134,8 +134,7 @@ class ComplementaritySolver {
     bool touched = false;   ///< some particle has come into contact
 
     static Progress both(const Progress& a, const Progress& b) noexcept {
-      return {a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative,
-              a.touched || b.touched};
+      return {a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative, a.touched || b.touched};
     }
     void add(Scalar amiss_here) noexcept {
       amiss += static_cast<double>(amiss_here);
@@ -143,27 +142,35 @@ class ComplementaritySolver {
     }
   };
 
-  /// Puts into image_ what residual_ asks for, over the contacts. Returns residual . image.
-  template <class Step>
-  double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step, bool in_bulk) noexcept {
-    if (in_bulk) {
-      cells_.solve();
-    }
+  /// Sum of term(i) over the particles, the same for any number of threads.
+  template <class Step, class Term>
+  double sum_over(const Step& step, Term&& term) noexcept {
     return reduction_of_sums_.over(
         step.fluid.size(), step.threads, 0.0,
         [&](Index begin, Index end) {
           double partial = 0;
           for (Index i = begin; i < end; ++i) {
-            const auto own = static_cast<std::size_t>(i);
-            const Scalar slope = squared_step * system.diagonal()[own];
-            // a particle that feels neither neighbours nor walls has no slope to divide by
-            const Scalar alone = slope > smallest_slope_ ? residual_[own] / slope : Scalar(0);
-            image_[own] = contact_[own] * (in_bulk ? alone + cells_.correction(own) : alone);
-            partial += static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
+            partial += term(static_cast<std::size_t>(i));
           }
           return partial;
         },
         [](double a, double b) { return a + b; });
+  }
+
+  /// Puts into image_ what residual_ asks for, over the contacts. Returns residual . image.
+  template <class Step>
+  double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step,
+                      bool in_bulk) noexcept {
+    if (in_bulk) {
+      cells_.solve();
+    }
+    return sum_over(step, [&](std::size_t own) {
+      const Scalar slope = squared_step * system.diagonal()[own];
+      // a particle that feels neither neighbours nor walls has no slope to divide by
+      const Scalar alone = slope > smallest_slope_ ? residual_[own] / slope : Scalar(0);
+      image_[own] = contact_[own] * (in_bulk ? alone + cells_.correction(own) : alone);
+      return static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
+    });
   }
 
   template <class Step>
@@ -177,7 +184,7 @@ class ComplementaritySolver {
   /// Clips pressures, finds residuals and contacts.
   template <class Step>
   Progress set_out(const Step& step, PressureSystem<Scalar>& system, const std::vector<Scalar>& offset,
-                 std::vector<Scalar>& term, Scalar squared_step) noexcept {
+                   std::vector<Scalar>& term, Scalar squared_step) noexcept {
     const Index count = step.fluid.size();
     clip(step, term);
     system.accelerate(step.neighbors, term.data(), step.threads);
@@ -206,18 +213,11 @@ class ComplementaritySolver {
   template <class Step>
   double apply(const Step& step, PressureSystem<Scalar>& system, Scalar squared_step) noexcept {
     system.accelerate(step.neighbors, direction_.data(), step.threads);
-    return reduction_of_sums_.over(
-        step.fluid.size(), step.threads, 0.0,
-        [&](Index begin, Index end) {
-          double partial = 0;
-          for (Index i = begin; i < end; ++i) {
-            const auto own = static_cast<std::size_t>(i);
-            image_[own] = -squared_step * system.density_rate(step.neighbors, system.accelerations(), i, false);
-            partial += static_cast<double>(image_[own]) * static_cast<double>(direction_[own]);
-          }
-          return partial;
-        },
-        [](double a, double b) { return a + b; });
+    return sum_over(step, [&](std::size_t own) {
+      image_[own] =
+          -squared_step * system.density_rate(step.neighbors, system.accelerations(), static_cast<Index>(own), false);
+      return static_cast<double>(image_[own]) * static_cast<double>(direction_[own]);
+    });
   }
 
   template <class Step>
@@ -253,7 +253,7 @@ class ComplementaritySolver {
   double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0
-  std::vector<Scalar> sum_{};  ///< accelerations by `term`, records of four
+  std::vector<Scalar> sum_{};      ///< accelerations by `term`, records of four
   Reduction<Progress> reduction_{};
   Reduction<double> reduction_of_sums_{};
 };

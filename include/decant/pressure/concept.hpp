@@ -21,7 +21,8 @@ struct PressureReport {
 };
 
 /// Keeps the liquid incompressible. A plain value with settings, and scratch memory of its own.
-/// begin_step(step, report): called when neighbours, walls and densities of a sub-step are there; may change velocities.
+/// begin_step(step, report): called when neighbours, walls and densities of a sub-step are there; may change
+/// velocities.
 /// solve(step, report): called when all other forces have been added to the velocities; adds those of pressure and may
 /// write step.shift, so that positions advanced by time_step * velocity + shift are where the liquid should be; writes
 /// fluid.pressure [Pa].
@@ -29,8 +30,8 @@ struct PressureReport {
 /// after the pressure (see ForceTerm); for what then is left to correct by velocities or step.shift.
 /// largest_step(step) [s]: the solver's own limit on the sub-step (sound speed, for one), infinity if it has none.
 /// memory(): what the solver remembers from one sub-step to the next, a value that snapshots copy, with
-/// reorder(order): the particles were put into another order, place k now holds what was at order[k]; particles that are
-/// new have a number beyond the old count. clear() forgets.
+/// reorder(order): the particles were put into another order, place k now holds what was at order[k]; particles that
+/// are new have a number beyond the old count. clear() forgets.
 /// search_margin [-]: neighbours are searched to the support radius times 1 + this.
 /// Nothing may throw; scratch memory grows with the number of particles only.
 /// Laws: still water stays still; momentum of a free drop is kept.

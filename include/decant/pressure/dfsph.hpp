@@ -18,19 +18,19 @@
 
 namespace decant {
 
-/// After Bender and Koschier 2017, "Divergence-free SPH for incompressible and viscous fluids" (IEEE TVCG 23), with its two
-/// constraints, on the velocity's divergence and on the density. Each is a linear complementarity problem: pressure >= 0
-/// where there is contact, compression <= 0 where there is none.
+/// After Bender and Koschier 2017, "Divergence-free SPH for incompressible and viscous fluids" (IEEE TVCG 23), with its
+/// two constraints, on the velocity's divergence and on the density. Each is a linear complementarity problem: pressure
+/// >= 0 where there is contact, compression <= 0 where there is none.
 ///   velocities:  dt D(v) <= max(rho_0 - rho, 0)      pressure acts on velocities
 ///   collisions:  dt D'(v) <= max(1.02 rho_0 - rho, 0), likewise, where particles meet at high speed or are too dense
 ///   places:      rho + dt D'(v) + D'(shift) <= rho_0   what is too dense moves apart, without gaining speed
-/// Where we differ: the paper adds the density correction to the velocities, which throws liquid that starts a little too
-/// dense into the air and keeps still water simmering; it forbids liquid below rest density to contract; and it takes one
-/// and the same divergence for both constraints. Here D' is the derivative of the summed density, as in the paper, and D
-/// is exact for linear velocities (GradientCorrection): how the density sum changes when particles slide past each other
-/// is a matter of their places, and must not slow them down. With D' for both, a standing wave 20 particles long lost
-/// half of its amplitude in a period and a half and ran 6 % too fast; with D it keeps it for as long as we looked.
-/// Velocities and places start from what the sub-step before ended with, collisions from nothing.
+/// Where we differ: the paper adds the density correction to the velocities, which throws liquid that starts a little
+/// too dense into the air and keeps still water simmering; it forbids liquid below rest density to contract; and it
+/// takes one and the same divergence for both constraints. Here D' is the derivative of the summed density, as in the
+/// paper, and D is exact for linear velocities (GradientCorrection): how the density sum changes when particles slide
+/// past each other is a matter of their places, and must not slow them down. With D' for both, a standing wave 20
+/// particles long lost half of its amplitude in a period and a half and ran 6 % too fast; with D it keeps it for as
+/// long as we looked. Velocities and places start from what the sub-step before ended with, collisions from nothing.
 template <class ScalarType>
 class Dfsph {
  public:
@@ -72,10 +72,10 @@ class Dfsph {
   /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
   /// down) with the stiffness p / (rho d^2), and the sub-step integrates that explicitly. With ResidualViscosity acting
   /// after the pressure, columns of forty layers stand still at 0.4 d / sqrt(p / rho), and collapse into themselves at
-  /// 0.5; without it, at 0.35. Taken for twice the mean pressure of what is under pressure, which is the largest of a liquid
-  /// at rest.
-  /// Liquid that is too dense all the same, after an impact on a deep pool for one, needs steps in which particles move
-  /// little against each other: at a third of the usual and below, even what has collapsed stands up again.
+  /// 0.5; without it, at 0.35. Taken for twice the mean pressure of what is under pressure, which is the largest of a
+  /// liquid at rest. Liquid that is too dense all the same, after an impact on a deep pool for one, needs steps in
+  /// which particles move little against each other: at a third of the usual and below, even what has collapsed stands
+  /// up again.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
     double total = 0, under_pressure = 0;
@@ -134,7 +134,8 @@ class Dfsph {
     const Scalar dt = step.time_step;
     if (compute_density_changes(step)) {
       std::fill(impulse_.begin(), impulse_.end(), Scalar(0));
-      report.divergence_iterations += relax(step, place_system_, impulse_, density_tolerance, collision_tolerance).iterations;
+      report.divergence_iterations +=
+          relax(step, place_system_, impulse_, density_tolerance, collision_tolerance).iterations;
       accelerate(step, place_system_);
       compute_density_changes(step);
     }
@@ -146,7 +147,8 @@ class Dfsph {
       offset_[own] = std::min(step.fluid.density[i] - step.rest_density + change_[own], most_compression);
       memory_.shift_term[own] /= dt;
     });
-    const ComplementarityReport places = relax(step, place_system_, memory_.shift_term, density_tolerance, largest_tolerance);
+    const ComplementarityReport places =
+        relax(step, place_system_, memory_.shift_term, density_tolerance, largest_tolerance);
     report.density_iterations += places.iterations;
     report.density_error = std::max(report.density_error, places.error);
     const Scalar farthest = largest_shift * step.spacing;
@@ -163,14 +165,14 @@ class Dfsph {
  private:
   enum class Flag : std::uint8_t { no, yes };  // vector<bool> shares bytes between threads
 
-  static constexpr double stability_share = 0.3;  ///< see largest_step
+  static constexpr double stability_share = 0.3;                                 ///< see largest_step
   static constexpr Scalar contact_room = Scalar(0.1), loose_room = Scalar(0.2);  ///< of rest density
-  static constexpr Scalar largest_correction = Scalar(0.05);  ///< of rest density, per sub-step
-  static constexpr Scalar largest_shift = Scalar(0.2);        ///< spacings, per sub-step
-  /// Where particles meet in disorder at high speed, D sees little of it, and places alone would have to be moved so far
-  /// that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
+  static constexpr Scalar largest_correction = Scalar(0.05);                     ///< of rest density, per sub-step
+  static constexpr Scalar largest_shift = Scalar(0.2);                           ///< spacings, per sub-step
+  /// Where particles meet in disorder at high speed, D sees little of it, and places alone would have to be moved so
+  /// far that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
   static constexpr Scalar collision_threshold = Scalar(0.02), collision_tolerance = Scalar(0.01);
-  static constexpr Scalar closing_time = Scalar(0.05);                           ///< [s]
+  static constexpr Scalar closing_time = Scalar(0.05);  ///< [s]
 
   void resize(Index count) {
     const auto n = static_cast<std::size_t>(count);
@@ -182,12 +184,13 @@ class Dfsph {
     velocity_.resize(4 * n);
   }
 
-  /// How much a particle may be compressed within a sub-step [kg/m^3]. Spray and the outermost layer may close up at once.
-  /// What is nearly at rest density is in contact: were it free to use up its last per mille of room in one sub-step, all
-  /// of a column would fall by that, be stopped, and never come to rest; so it closes slowly.
+  /// How much a particle may be compressed within a sub-step [kg/m^3]. Spray and the outermost layer may close up at
+  /// once. What is nearly at rest density is in contact: were it free to use up its last per mille of room in one
+  /// sub-step, all of a column would fall by that, be stopped, and never come to rest; so it closes slowly.
   static Scalar slack(Scalar density, Scalar rest_density, Scalar time_step) noexcept {
     const Scalar room = std::max(rest_density - density, Scalar(0));
-    const Scalar loose = std::clamp((room / rest_density - contact_room) / (loose_room - contact_room), Scalar(0), Scalar(1));
+    const Scalar loose =
+        std::clamp((room / rest_density - contact_room) / (loose_room - contact_room), Scalar(0), Scalar(1));
     return room * std::max(loose, std::min(time_step / closing_time, Scalar(1)));
   }
 
@@ -207,19 +210,20 @@ class Dfsph {
     velocities_to_records(step);
     const Scalar tolerated = collision_threshold * step.rest_density;
     return flags_.over(
-        step.fluid.size(), step.threads, Flag::no,
-        [&](Index begin, Index end) {
-          bool any = false;
-          for (Index i = begin; i < end; ++i) {
-            const auto own = static_cast<std::size_t>(i);
-            change_[own] = step.time_step * place_system_.density_rate(step.neighbors, velocity_.data(), i, true);
-            const Scalar room = step.rest_density - step.fluid.density[i];
-            offset_[own] = change_[own] - (room > 0 ? tolerated + room : std::max(tolerated + room, Scalar(0)));
-            any = any || offset_[own] > 0;
-          }
-          return any ? Flag::yes : Flag::no;
-        },
-        [](Flag a, Flag b) { return std::max(a, b); }) == Flag::yes;
+               step.fluid.size(), step.threads, Flag::no,
+               [&](Index begin, Index end) {
+                 bool any = false;
+                 for (Index i = begin; i < end; ++i) {
+                   const auto own = static_cast<std::size_t>(i);
+                   change_[own] =
+                       step.time_step * place_system_.density_rate(step.neighbors, velocity_.data(), i, true);
+                   const Scalar room = step.rest_density - step.fluid.density[i];
+                   offset_[own] = change_[own] - (room > 0 ? tolerated + room : std::max(tolerated + room, Scalar(0)));
+                   any = any || offset_[own] > 0;
+                 }
+                 return any ? Flag::yes : Flag::no;
+               },
+               [](Flag a, Flag b) { return std::max(a, b); }) == Flag::yes;
   }
 
   template <class Step>

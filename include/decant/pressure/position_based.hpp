@@ -18,13 +18,13 @@
 
 namespace decant {
 
-/// After Macklin and Mueller 2013, "Position based fluids" (ACM TOG 32). With the constraint C_i = rho_i / rho_0 - 1 <= 0
-/// of every particle at its predicted position x* = x + dt v, each sweep computes (eqs. 8, 9, 11, 12)
+/// After Macklin and Mueller 2013, "Position based fluids" (ACM TOG 32). With the constraint C_i = rho_i / rho_0 - 1 <=
+/// 0 of every particle at its predicted position x* = x + dt v, each sweep computes (eqs. 8, 9, 11, 12)
 ///   lambda_i = -omega C_i / (sum_k |grad_k C_i|^2 + epsilon),
 ///   dx_i     = (1 / rho_0) sum_j m_j (lambda_i + lambda_j) grad W_ij + 2 lambda_i grad phi_i
-/// and velocities become (x_new - x) / dt. Constraints only push: a sweep may take back what earlier ones pushed too far,
-/// and no more (the paper applies C_i of either sign or of positive sign only). Pair moves are mutual, so momentum is kept
-/// to rounding. Neighbours are those of the start, found a little beyond the support; walls enter linearised,
+/// and velocities become (x_new - x) / dt. Constraints only push: a sweep may take back what earlier ones pushed too
+/// far, and no more (the paper applies C_i of either sign or of positive sign only). Pair moves are mutual, so momentum
+/// is kept to rounding. Neighbours are those of the start, found a little beyond the support; walls enter linearised,
 /// phi(x*) = phi(x) + grad phi . (x* - x) - dt flux, and mirror lambda as they mirror pressure in PressureSystem.
 /// Robust with large steps, with an error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy.
 template <class ScalarType>
@@ -33,10 +33,10 @@ class PositionBased {
   using Scalar = ScalarType;
   static constexpr double search_margin = 0.1;
 
-  int most_iterations = 12;                ///< sweeps per sub-step, >= 1
+  int most_iterations = 12;                 ///< sweeps per sub-step, >= 1
   Scalar density_tolerance = Scalar(1e-3);  ///< mean compression over the liquid that ends the sweeps [-]
-  /// omega [-], 0 < omega <= 1. All particles move at once, each as if the others stood still; at more than about a half
-  /// they overshoot together.
+  /// omega [-], 0 < omega <= 1. All particles move at once, each as if the others stood still; at more than about a
+  /// half they overshoot together.
   Scalar relaxation = Scalar(0.5);
   /// epsilon over the denominator of a full neighbourhood [-], >= 0: softens particles with few neighbours.
   Scalar softness = Scalar(0.01);
@@ -101,8 +101,8 @@ class PositionBased {
  private:
   using B = Batch<Scalar>;
 
-  /// Separations at the predicted positions, pair by pair: those of the list and the difference of what was moved. Works
-  /// in periodic domains as well.
+  /// Separations at the predicted positions, pair by pair: those of the list and the difference of what was moved.
+  /// Works in periodic domains as well.
   struct Moved {
     B x, y, z, distance, mass;
   };

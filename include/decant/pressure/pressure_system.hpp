@@ -19,8 +19,9 @@ namespace decant {
 /// (boundary/wall_function.hpp),
 ///   a_i    = -sum_j m_j (P_i L_i + P_j L_j) grad W_ij - rho_0 P_i L_i grad s_i                acceleration  [m/s^2]
 ///   D_i(v) = sum_j m_j (v_i - v_j) . L_i grad W_ij + rho_0 sum_walls (L_i grad s_i) . (v_i - v_wall)
-/// with D a density rate [kg/(m^3 s)]; of L_i grad s_i the part along grad s_i counts. For equal masses -D is the adjoint of a: pressure takes as much energy out of the
-/// liquid as the compression it removes. There are two such systems:
+/// with D a density rate [kg/(m^3 s)]; of L_i grad s_i the part along grad s_i counts. For equal masses -D is the
+/// adjoint of a: pressure takes as much energy out of the liquid as the compression it removes. There are two such
+/// systems:
 ///   assemble()   L = 1: D is the exact derivative of the summed density;
 ///   correct()    L from GradientCorrection: D is the exact divergence of linear velocities, so shear meets no pressure
 ///                and rigid motion no compression.
@@ -140,7 +141,8 @@ class PressureSystem {
 
   /// D_i of one particle for vectors in records of four: velocities, or accelerations (then walls do not move).
   template <class Neighbors>
-  [[gnu::always_inline]] Scalar density_rate(const Neighbors& list, const Scalar* records, Index i, bool walls_move) const noexcept {
+  [[gnu::always_inline]] Scalar density_rate(const Neighbors& list, const Scalar* records, Index i,
+                                             bool walls_move) const noexcept {
     const auto own = static_cast<std::size_t>(i);
     B away(Scalar(0));
     for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
@@ -204,9 +206,10 @@ class PressureSystem {
   Index count_ = 0;
   Scalar rest_density_ = 0;
   bool corrected_ = false;
-  std::vector<Scalar> rate_{};      ///< m_j L_i grad W_ij in the order of the list's index: a batch of x, of y, of z
-  std::vector<Scalar> push_{};      ///< m_j L_j grad W_ij likewise, where L is not 1
-  std::vector<Scalar> total_{};     ///< sum_j m_j L_i grad W_ij + rho_0 L_i grad s, and the walls' part of -D; records of four
+  std::vector<Scalar> rate_{};  ///< m_j L_i grad W_ij in the order of the list's index: a batch of x, of y, of z
+  std::vector<Scalar> push_{};  ///< m_j L_j grad W_ij likewise, where L is not 1
+  std::vector<Scalar>
+      total_{};  ///< sum_j m_j L_i grad W_ij + rho_0 L_i grad s, and the walls' part of -D; records of four
   std::vector<Scalar> diagonal_{};
   std::vector<Scalar> records_{};
 };

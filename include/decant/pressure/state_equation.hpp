@@ -19,26 +19,27 @@
 
 namespace decant {
 
-/// Tait's equation p = B ((rho / rho_0)^gamma - 1) (Monaghan 1994, "Simulating free surface flows with SPH", eq. 2.3; its
-/// sound speed is c^2 = gamma B / rho_0), with the symmetric, momentum-conserving pressure force of Monaghan 1992
+/// Tait's equation p = B ((rho / rho_0)^gamma - 1) (Monaghan 1994, "Simulating free surface flows with SPH", eq. 2.3;
+/// its sound speed is c^2 = gamma B / rho_0), with the symmetric, momentum-conserving pressure force of Monaghan 1992
 ///   a_i = -sum_j m_j (P_i + P_j) grad W_ij - 2 rho_0 P_i grad phi_i,    P = p / rho^2,
-/// where walls mirror the particle's pressure (see PressureSystem). Densities are the summed ones of the sub-step, so they
-/// do not drift. One sweep over the pairs and nothing stored per pair; steps are as short as sound demands, about 0.4 d/c.
-/// With gamma = 1 it is the linear p = c^2 (rho - rho_0): see set_sound_speed.
+/// where walls mirror the particle's pressure (see PressureSystem). Densities are the summed ones of the sub-step, so
+/// they do not drift. One sweep over the pairs and nothing stored per pair; steps are as short as sound demands, about
+/// 0.4 d/c. With gamma = 1 it is the linear p = c^2 (rho - rho_0): see set_sound_speed.
 template <class ScalarType>
 class StateEquation {
  public:
   using Scalar = ScalarType;
   static constexpr double search_margin = 0;
 
-  Scalar stiffness = Scalar(50000);   ///< B [Pa], > 0
-  Scalar exponent = Scalar(7);        ///< gamma [-], >= 1
+  Scalar stiffness = Scalar(50000);     ///< B [Pa], > 0
+  Scalar exponent = Scalar(7);          ///< gamma [-], >= 1
   Scalar courant_number = Scalar(0.4);  ///< how many spacings sound may travel per sub-step, > 0
   /// Lets pressures be negative where the liquid is thinner than at rest. Off by default: a summed density is low at
   /// every free surface, and particles that attract each other clump (the tensile instability, Monaghan 2000).
   bool negative_pressure = false;
   /// Monaghan's artificial viscosity, alpha [-], >= 0, off by default. It brakes pairs that approach each other, with
-  ///   a_i += alpha h c sum_j m_j / rho_ij (v_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij   (Monaghan 1992, eq. 4.1, beta 0)
+  ///   a_i += alpha h c sum_j m_j / rho_ij (v_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij   (Monaghan 1992, eq. 4.1, beta
+  ///   0)
   /// and quietens the sound that an impact leaves. 0.01 .. 0.1 is usual; it acts like a kinematic viscosity of about
   /// alpha h c / 20, so results depend on the spacing.
   Scalar artificial_viscosity = Scalar(0);

@@ -19,11 +19,11 @@ namespace decant {
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS), section on the simulator: the
 /// linear equation of state p = c^2 (rho - rho_0) and, with the acceleration f / rho, the force density
 ///   f_i = -sum_j (m_j / rho_j) (p_i / rho_i^2 + p_j / rho_j^2) grad W_ij.
-/// This is short of a factor rho_i rho_j, without which the units do not make a force density; StateEquation has it. For
-/// water the printed force is a million times too small, so the printed c is a gain rather than a speed: liquid at rest
-/// density rho_0 answers as if sound travelled at c / rho_0 * (1 kg/m^3). The default acts like 20 m/s in water.
-/// Pressures below zero are set to zero, as any free surface requires; walls mirror the pressure of the particle at them.
-/// For comparison with the paper; take StateEquation for anything else.
+/// This is short of a factor rho_i rho_j, without which the units do not make a force density; StateEquation has it.
+/// For water the printed force is a million times too small, so the printed c is a gain rather than a speed: liquid at
+/// rest density rho_0 answers as if sound travelled at c / rho_0 * (1 kg/m^3). The default acts like 20 m/s in water.
+/// Pressures below zero are set to zero, as any free surface requires; walls mirror the pressure of the particle at
+/// them. For comparison with the paper; take StateEquation for anything else.
 template <class ScalarType>
 class StateEquationSchenck2017 {
  public:
@@ -79,14 +79,13 @@ class StateEquationSchenck2017 {
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
         const auto other = gather4(records_.data(), pair.neighbor);  // x: p / rho^2, y: volume
-        const B push = other.y * (own_term + other.x) *
-                       Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B push =
+            other.y * (own_term + other.x) * Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
       });
-      const Vector3<Scalar> force =
-          -Vector3<Scalar>(sum(x), sum(y), sum(z)) - own[0] * step.walls.gradient.col(i);
+      const Vector3<Scalar> force = -Vector3<Scalar>(sum(x), sum(y), sum(z)) - own[0] * step.walls.gradient.col(i);
       step.fluid.velocity.col(i) += step.time_step / step.fluid.density[i] * force;
     });
   }

@@ -36,11 +36,11 @@ struct FillAmount {
 
 /// What came of it.
 struct FillReport {
-  Index particles = 0;      ///< that were added
-  double volume = 0;        ///< theirs [m^3]
-  double capacity = 0;      ///< of the container below its rim, as it stands [m^3]
-  double level = 0;         ///< of the settled free surface above the cavity's lowest point [m]
-  int settled = 0;          ///< how many fillings were tried and settled
+  Index particles = 0;  ///< that were added
+  double volume = 0;    ///< theirs [m^3]
+  double capacity = 0;  ///< of the container below its rim, as it stands [m^3]
+  double level = 0;     ///< of the settled free surface above the cavity's lowest point [m]
+  int settled = 0;      ///< how many fillings were tried and settled
 };
 
 /// Height of the free surface of the liquid in a cavity above the cavity's lowest point [m]: half a spacing above the
@@ -76,12 +76,13 @@ double free_surface_level(const FluidState<Scalar>& fluid, const Cavity& cavity,
 
 namespace detail {
 
-/// The lowest `count` places of a lattice in the cavity that stays off the walls; the lattice is as wide as one particle
-/// spacing, or narrower where that is needed for `count` particles to fit below `level`.
+/// The lowest `count` places of a lattice in the cavity that stays off the walls; the lattice is as wide as one
+/// particle spacing, or narrower where that is needed for `count` particles to fit below `level`.
 inline PointArray<double> places_in(const Cavity& cavity, const BoundingVolumeHierarchy& surface,
                                     const Vector3<double>& up, double level, Index count, double spacing) {
-  const Vector3<double> across = std::abs(up.x()) < 0.9 ? Vector3<double>((Vector3<double>::UnitX() - up.x() * up).normalized())
-                                                        : up.unitOrthogonal();
+  const Vector3<double> across = std::abs(up.x()) < 0.9
+                                     ? Vector3<double>((Vector3<double>::UnitX() - up.x() * up).normalized())
+                                     : up.unitOrthogonal();
   const Vector3<double> along = up.cross(across);
   const Eigen::AlignedBox3d bounds = surface.bounds();
   const Vector3<double> center = bounds.center();
@@ -149,15 +150,16 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
       expects(amount.value >= 0 && amount.value <= 1, name + "fraction", "0 .. 1", amount.value);
       volume = amount.value * report.capacity;
       break;
-    case FillAmount::Kind::volume: break;
+    case FillAmount::Kind::volume:
+      break;
     case FillAmount::Kind::level:
       expects(amount.value >= 0 && amount.value <= cavity.rim_height() - cavity.bottom_height(), name + "level [m]",
               "between 0 and the rim", amount.value);
       volume = cavity.volume_below(cavity.bottom_height() + amount.value);
       break;
   }
-  expects(volume >= 0 && volume <= report.capacity * (1 + 1e-9), name + "volume [m^3]", "between 0 and what it holds below its rim",
-          volume);
+  expects(volume >= 0 && volume <= report.capacity * (1 + 1e-9), name + "volume [m^3]",
+          "between 0 and what it holds below its rim", volume);
 
   const double particle_volume = spacing * spacing * spacing;
   auto count = static_cast<Index>(std::llround(volume / particle_volume));
@@ -181,13 +183,15 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   const auto before = simulator.snapshot();
   place(count);
   if (amount.kind == FillAmount::Kind::level && count > 0) {
-    // The settled surface tells how much is missing; each new count lies between those known to be too few and too many.
+    // The settled surface tells how much is missing; each new count lies between those known to be too few and too
+    // many.
     Index too_few = 0, too_many = most + 1;
     for (int round = 0; round < 5 && std::abs(report.level - amount.value) > 0.25 * spacing; ++round) {
       (report.level < amount.value ? too_few : too_many) = count;
-      const double area = (cavity.volume_below(std::min(cavity.bottom_height() + amount.value + spacing, cavity.rim_height())) -
-                           cavity.volume_below(cavity.bottom_height() + amount.value - spacing)) /
-                          (2 * spacing);
+      const double area =
+          (cavity.volume_below(std::min(cavity.bottom_height() + amount.value + spacing, cavity.rim_height())) -
+           cavity.volume_below(cavity.bottom_height() + amount.value - spacing)) /
+          (2 * spacing);
       const auto missing = static_cast<Index>(std::llround((amount.value - report.level) * area / particle_volume));
       const Index next = std::clamp(count + missing, too_few + 1, std::max(too_few + 1, too_many - 1));
       if (next == count || too_many - too_few <= 1) {

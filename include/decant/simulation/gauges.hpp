@@ -129,9 +129,9 @@ class Gauges {
   /// Highest point of the liquid along a body's own z axis, in the body's frame [m]; of the liquid within the body's
   /// `bounds` across that axis, the largest piece counts. Nothing where there is none.
   /// Liquid is measured by volume, as the highest particle would be too high by what particles stray: above a slab in
-  /// which liquid is everywhere, a column of a few spacings across holds as much more as its surface is higher. A surface
-  /// that leans goes on to where the liquid ends. Crests narrower than the column are flattened; liquid less than seven
-  /// spacings deep counts by its highest particle.
+  /// which liquid is everywhere, a column of a few spacings across holds as much more as its surface is higher. A
+  /// surface that leans goes on to where the liquid ends. Crests narrower than the column are flattened; liquid less
+  /// than seven spacings deep counts by its highest particle.
   std::optional<double> top(const Pose& world_from_body, const Eigen::AlignedBox3d& bounds) {
     find_pieces();
     const Pose body_from_world = world_from_body.inverse();
@@ -183,9 +183,8 @@ class Gauges {
         plane.add(apart, 1 - distance_squared / (slope_reach * slope_reach * spacing_ * spacing_));
       };
       add(column, 0);
-      flat_grid_.for_each(k, [&](Index j, double distance_squared) {
-        add(columns_[static_cast<std::size_t>(j)], distance_squared);
-      });
+      flat_grid_.for_each(
+          k, [&](Index j, double distance_squared) { add(columns_[static_cast<std::size_t>(j)], distance_squared); });
       const Eigen::Vector3d fit = plane.solve();
       const Eigen::Vector2d slope = fit.tail<2>();
       const double steepness = slope.norm();
@@ -282,9 +281,8 @@ class Gauges {
       sum += weight * (1 - under) * x.template head<2>();
     };
     add(own, 0);
-    flat_grid_.for_each(i, [&](Index j, double distance_squared) {
-      add(bulk_[static_cast<std::size_t>(j)], distance_squared);
-    });
+    flat_grid_.for_each(
+        i, [&](Index j, double distance_squared) { add(bulk_[static_cast<std::size_t>(j)], distance_squared); });
     if (in_slab > 0) {
       column.center = sum / (above + in_slab);
       column.height = slab_top + above / in_slab * (slab_top - slab_bottom);

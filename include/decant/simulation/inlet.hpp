@@ -16,10 +16,10 @@ namespace decant {
 
 /// What an inlet is asked to do.
 struct InletSettings {
-  Vector3<double> position = Vector3<double>::Zero();        ///< centre of the opening, world frame [m]
-  Vector3<double> direction = -Vector3<double>::UnitZ();     ///< of the flow; normalised
-  double radius = 0.01;                                      ///< of the opening [m], > 0
-  std::vector<std::pair<double, double>> flow{};             ///< (time [s], flow [m^3/s]), linear between, 0 outside
+  Vector3<double> position = Vector3<double>::Zero();     ///< centre of the opening, world frame [m]
+  Vector3<double> direction = -Vector3<double>::UnitZ();  ///< of the flow; normalised
+  double radius = 0.01;                                   ///< of the opening [m], > 0
+  std::vector<std::pair<double, double>> flow{};          ///< (time [s], flow [m^3/s]), linear between, 0 outside
 };
 
 /// Hands out layers of particles, one spacing thick, whenever enough volume has come in. Plug flow: each layer leaves
@@ -31,11 +31,12 @@ class Inlet {
     expects(settings_.position.allFinite(), "Inlet: position [m]", "finite", settings_.position.transpose());
     expects(settings_.direction.allFinite() && settings_.direction.norm() > 1e-9, "Inlet: direction",
             "a finite vector other than zero", settings_.direction.transpose());
-    expects(settings_.radius > 0 && settings_.radius < 1e3 * spacing, "Inlet: radius [m]", "> 0 and below 1000 spacings",
-            settings_.radius);
+    expects(settings_.radius > 0 && settings_.radius < 1e3 * spacing, "Inlet: radius [m]",
+            "> 0 and below 1000 spacings", settings_.radius);
     for (std::size_t k = 0; k < settings_.flow.size(); ++k) {
-      expects(std::isfinite(settings_.flow[k].first) && (k == 0 || settings_.flow[k].first > settings_.flow[k - 1].first),
-              "Inlet: time [s] of the flow", "finite and increasing", settings_.flow[k].first);
+      expects(
+          std::isfinite(settings_.flow[k].first) && (k == 0 || settings_.flow[k].first > settings_.flow[k - 1].first),
+          "Inlet: time [s] of the flow", "finite and increasing", settings_.flow[k].first);
       expects(settings_.flow[k].second >= 0 && std::isfinite(settings_.flow[k].second), "Inlet: flow [m^3/s]",
               ">= 0 and finite", settings_.flow[k].second);
     }
@@ -69,21 +70,22 @@ class Inlet {
   }
 
   /// Of the liquid that comes in [m/s].
-  double speed(double time) const noexcept { return flow(time) / (static_cast<double>(layer_.size()) * spacing_ * spacing_); }
+  double speed(double time) const noexcept {
+    return flow(time) / (static_cast<double>(layer_.size()) * spacing_ * spacing_);
+  }
 
   /// Lets time pass; calls emit(position, velocity) for each particle that has come in meanwhile.
   template <class Emit>
   void advance(double time, double time_step, Emit&& emit) {
-    const double rate = flow(time + 0.5 * time_step);
-    const double layer_volume = static_cast<double>(layer_.size()) * spacing_ * spacing_ * spacing_;
-    pending_ += rate * time_step;
-    const double fast = speed(time + 0.5 * time_step);
-    while (pending_ >= layer_volume) {
-      pending_ -= layer_volume;
-      // the layer passed the opening a moment ago
-      const double travelled = rate > 0 ? fast * pending_ / rate : 0;
+    const double opening = static_cast<double>(layer_.size()) * spacing_ * spacing_;
+    const Vector3<double> velocity = speed(time + 0.5 * time_step) * settings_.direction;
+    pending_ += flow(time + 0.5 * time_step) * time_step;
+    while (pending_ >= opening * spacing_) {
+      pending_ -= opening * spacing_;
+      // the layer passed the opening a moment ago; what came in after it fills the space between
+      const Vector3<double> travelled = pending_ / opening * settings_.direction;
       for (const Vector3<double>& place : layer_) {
-        emit(Vector3<double>(place + travelled * settings_.direction), Vector3<double>(fast * settings_.direction));
+        emit(Vector3<double>(place + travelled), velocity);
       }
     }
   }

@@ -12,9 +12,9 @@ namespace decant {
 
 /// Bulk properties of a Newtonian liquid against air.
 struct Liquid {
-  double density = 998.2;              ///< [kg/m^3], > 0
+  double density = 998.2;                ///< [kg/m^3], > 0
   double dynamic_viscosity = 1.0016e-3;  ///< mu [Pa s], >= 0
-  double surface_tension = 0.07275;    ///< sigma [N/m], >= 0
+  double surface_tension = 0.07275;      ///< sigma [N/m], >= 0
 
   /// nu = mu / rho [m^2/s].
   double kinematic_viscosity() const { return dynamic_viscosity / density; }
@@ -30,7 +30,8 @@ inline void validate(const Liquid& liquid) {
           ">= 0 and < 100", liquid.surface_tension);
 }
 
-/// Real liquids at 20 degrees Celsius; values as commonly tabulated, with the works that treat them. Honey varies by a factor of ten with its water content; milk with its fat.
+/// Real liquids at 20 degrees Celsius; values as commonly tabulated, with the works that treat them. Honey varies by a
+/// factor of ten with its water content; milk with its fat.
 namespace liquids {
 
 /// IAPWS formulations (density, viscosity R12-08, surface tension R1-76).

@@ -24,9 +24,9 @@
 
 namespace decant {
 
-/// Incompressible liquid with standard, momentum-conserving forces. `float` holds micrometres over metres and is twice as
-/// fast; take `double` for analysis. Surface tension is left out: at spacings above a millimetre or two, water's capillary
-/// length (2.7 mm) is below what particles resolve; CapillaryParts has it.
+/// Incompressible liquid with standard, momentum-conserving forces. `float` holds micrometres over metres and is twice
+/// as fast; take `double` for analysis. Surface tension is left out: at spacings above a millimetre or two, water's
+/// capillary length (2.7 mm) is below what particles resolve; CapillaryParts has it.
 template <class ScalarType = float>
 struct DefaultParts {
   using Scalar = ScalarType;
@@ -48,7 +48,7 @@ struct PeriodicParts : DefaultParts<ScalarType> {
 /// With surface tension, for drops and thin jets.
 template <class ScalarType = float>
 struct CapillaryParts : DefaultParts<ScalarType> {
-  using Forces = 
+  using Forces =
       std::tuple<Gravity<ScalarType>, Viscosity<ScalarType>, ResidualViscosity<ScalarType>, SurfaceTension<ScalarType>>;
 };
 
@@ -73,7 +73,8 @@ struct PositionBasedParts : DefaultParts<ScalarType> {
 /// Every formula as Schenck and Fox 2017 print it (see the headers for what differs from the standard forms).
 template <class ScalarType = float>
 struct Schenck2017Parts : DefaultParts<ScalarType> {
-  using Forces = std::tuple<Gravity<ScalarType>, ViscositySchenck2017<ScalarType>, SurfaceTensionSchenck2017<ScalarType>>;
+  using Forces =
+      std::tuple<Gravity<ScalarType>, ViscositySchenck2017<ScalarType>, SurfaceTensionSchenck2017<ScalarType>>;
   using PressureSolver = StateEquationSchenck2017<ScalarType>;
 };
 

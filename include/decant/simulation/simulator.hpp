@@ -15,6 +15,7 @@
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/concept.hpp>
 #include <decant/boundary/mesh_report.hpp>
+#include <decant/boundary/shielding.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
@@ -29,48 +30,10 @@
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/liquid.hpp>
 #include <decant/simulation/parts.hpp>
+#include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 
 namespace decant {
-
-/// What every simulator needs to know, whatever its parts.
-struct SimulatorSettings {
-  double spacing = 0.005;                           ///< particle spacing d [m], > 0
-  Liquid liquid{};                                  ///< rest density, viscosity, surface tension
-  Vector3<double> gravity{0, 0, -9.81};             ///< [m/s^2], world frame
-  double support_in_spacings = 2;                   ///< support radius over d, 1.5 .. 4
-  double largest_step = 0.005;                      ///< longest sub-step [s], > 0
-  double courant_number = 0.4;                      ///< how many spacings liquid may move past a body per sub-step,
-                                                    ///< 0 < .. <= 1
-  double fixed_step = 0;                            ///< if > 0, the length of every sub-step [s] (frames need not fit)
-  int most_sub_steps = 2000;                        ///< per frame; beyond it a frame is refused
-  double numerical_viscosity = 0.6;                 ///< of ResidualViscosity, in units of d sqrt(g d), and a third of it in
-                                                    ///< units of d sqrt(p / rho_0) where that is more: calms motion from
-                                                    ///< particle to particle and leaves the liquid's alone; >= 0
-  Threads threads{};                                ///< 0: all
-};
-
-/// Throws std::invalid_argument if a setting is out of range.
-inline void validate(const SimulatorSettings& settings) {
-  validate(settings.liquid);
-  expects(settings.spacing >= 1e-5 && settings.spacing <= 10, "SimulatorSettings: spacing [m]", "1e-5 .. 10",
-          settings.spacing);
-  expects(settings.gravity.allFinite() && settings.gravity.norm() < 1e4, "SimulatorSettings: gravity [m/s^2]",
-          "finite and below 1e4", settings.gravity.transpose());
-  expects(settings.support_in_spacings >= 1.5 && settings.support_in_spacings <= 4,
-          "SimulatorSettings: support_in_spacings", "1.5 .. 4", settings.support_in_spacings);
-  expects(settings.largest_step > 0 && std::isfinite(settings.largest_step), "SimulatorSettings: largest_step [s]",
-          "> 0 and finite", settings.largest_step);
-  expects(settings.courant_number > 0 && settings.courant_number <= 1, "SimulatorSettings: courant_number",
-          "> 0 and <= 1", settings.courant_number);
-  expects(settings.fixed_step >= 0 && std::isfinite(settings.fixed_step), "SimulatorSettings: fixed_step [s]",
-          ">= 0 and finite", settings.fixed_step);
-  expects(settings.numerical_viscosity >= 0 && settings.numerical_viscosity < 100,
-          "SimulatorSettings: numerical_viscosity", ">= 0 and < 100", settings.numerical_viscosity);
-  expects(settings.most_sub_steps > 0, "SimulatorSettings: most_sub_steps", "> 0", settings.most_sub_steps);
-  expects(settings.threads.count >= 0 && settings.threads.count <= 1024, "SimulatorSettings: threads", "0 .. 1024",
-          settings.threads.count);
-}
 
 /// A liquid simulation composed of Parts (see simulation/parts.hpp). Holds no global state: any number of differently
 /// composed simulators can live side by side. Not safe to call from several threads at once; copies are independent.
@@ -87,14 +50,17 @@ class Simulator {
   using Neighbors = NeighborList<Scalar, Domain>;
   using Step = StepView<Kernel, Neighbors>;
 
-  static_assert(SmoothingKernel<Kernel>, "Parts::Kernel must model decant::SmoothingKernel, see <decant/kernel/concept.hpp>");
+  static_assert(SmoothingKernel<Kernel>,
+                "Parts::Kernel must model decant::SmoothingKernel, see <decant/kernel/concept.hpp>");
   static_assert(NeighborSearch<Search>,
                 "Parts::NeighborSearch must model decant::NeighborSearch, see <decant/neighbor/concept.hpp>");
   static_assert(PressureSolver<Solver, Step>,
                 "Parts::PressureSolver must model decant::PressureSolver, see <decant/pressure/concept.hpp>");
-  static_assert([]<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
-    return (ForceTerm<Terms, Step> && ...);
-  }(std::type_identity<Forces>{}), "every type in Parts::Forces must model decant::ForceTerm, see <decant/force/concept.hpp>");
+  static_assert(
+      []<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
+        return (ForceTerm<Terms, Step> && ...);
+      }(std::type_identity<Forces>{}),
+      "every type in Parts::Forces must model decant::ForceTerm, see <decant/force/concept.hpp>");
   static_assert(Boundary<Bodies, Kernel>,
                 "Parts::Boundary must model decant::Boundary, see <decant/boundary/concept.hpp>");
 
@@ -102,16 +68,15 @@ class Simulator {
   explicit Simulator(const SimulatorSettings& settings = {}, const Domain& domain = {})
       : settings_(settings), domain_(domain), search_(domain), neighbors_(domain) {
     validate(settings_);
-    smoothing_length_ =
-        settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
+    smoothing_length_ = settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
     configure_forces();
   }
 
   // ---- the scene --------------------------------------------------------------------------------------------------
 
-  /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the body
-  /// is put is pushed out of its material. Throws std::invalid_argument for a mesh that is empty, not finite or of the
-  /// wrong size; flaws that it can live with are in bodies()[body].warnings, see also mesh_report.
+  /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the
+  /// body is put is pushed out of its material. Throws std::invalid_argument for a mesh that is empty, not finite or of
+  /// the wrong size; flaws that it can live with are in bodies()[body].warnings, see also mesh_report.
   BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
     const BodyId body = bodies_.template add<Kernel>(std::move(name), std::move(shape), std::move(motion), slip,
                                                      smoothing_length_, settings_.spacing, settings_.threads);
@@ -130,8 +95,8 @@ class Simulator {
                    bodies_[body].motion.at(time_).rotation.conjugate() * up);
   }
 
-  /// Replaces a body's motion, from now on. While there is liquid, the new motion has to begin where the body is: a jump
-  /// would leave its liquid behind. (move_body takes a body anywhere, along a path.)
+  /// Replaces a body's motion, from now on. While there is liquid, the new motion has to begin where the body is: a
+  /// jump would leave its liquid behind. (move_body takes a body anywhere, along a path.)
   void set_motion(BodyId body, PoseTrack motion) {
     expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
     const Pose now = bodies_[body].motion.at(time_), then = motion.at(time_);
@@ -176,7 +141,8 @@ class Simulator {
 
   /// Adds particles of one spacing's volume each. @param position, velocity 3xN, [m] and [m/s], world frame, finite.
   void add_particles(const ConstPointsView<Scalar>& position, const ConstPointsView<Scalar>& velocity, Origin origin) {
-    expects(position.cols() == velocity.cols(), "Simulator: number of velocities", "that of positions", velocity.cols());
+    expects(position.cols() == velocity.cols(), "Simulator: number of velocities", "that of positions",
+            velocity.cols());
     expects(position.allFinite(), "Simulator: positions of new particles", "finite", "NaN or infinity");
     expects(velocity.allFinite(), "Simulator: velocities of new particles", "finite", "NaN or infinity");
     for (Index k = 0; k < position.cols(); ++k) {
@@ -185,7 +151,9 @@ class Simulator {
   }
 
   /// Adds an inlet; its liquid gets `origin`.
-  void add_inlet(const InletSettings& inlet, Origin origin) { inlets_.push_back({Inlet(inlet, settings_.spacing), origin}); }
+  void add_inlet(const InletSettings& inlet, Origin origin) {
+    inlets_.push_back({Inlet(inlet, settings_.spacing), origin});
+  }
 
   /// Removes all particles for which f(index) is true. @return how many.
   template <class Predicate>
@@ -292,12 +260,14 @@ class Simulator {
   const Bodies& bodies() const noexcept { return bodies_; }
   const SimulatorSettings& settings() const noexcept { return settings_; }
   const Domain& domain() const noexcept { return domain_; }
-  double time() const noexcept { return time_; }  ///< [s]
+  double time() const noexcept { return time_; }                          ///< [s]
   double smoothing_length() const noexcept { return smoothing_length_; }  ///< [m]
 
   /// A part, to read or change its settings.
   template <class Force>
-  Force& force() noexcept { return std::get<Force>(forces_); }
+  Force& force() noexcept {
+    return std::get<Force>(forces_);
+  }
   Solver& pressure_solver() noexcept { return solver_; }
 
   /// As of the last sub-step: what walls contributed at each particle. In the order of fluid().
@@ -326,7 +296,8 @@ class Simulator {
 
   // ---- snapshots --------------------------------------------------------------------------------------------------
 
-  /// All that the future depends on, and which containers are watched. A run that is restored continues bit for bit as the first one did.
+  /// All that the future depends on, and which containers are watched. A run that is restored continues bit for bit as
+  /// the first one did.
   struct Snapshot {
     FluidState<Scalar> fluid;
     typename Solver::Memory memory;
@@ -339,7 +310,7 @@ class Simulator {
   };
 
   Snapshot snapshot() const {
-    return {fluid_, const_cast<Solver&>(solver_).memory(), bodies_, time_, longest_step_, next_id_, lost_, inlets_,
+    return {fluid_,  const_cast<Solver&>(solver_).memory(), bodies_, time_, longest_step_, next_id_, lost_, inlets_,
             watched_};
   }
 
@@ -356,16 +327,21 @@ class Simulator {
   }
 
  private:
-  /// Of a sub-step over the one before. While liquid bounces its pressure comes and goes, and the solver's limit with it.
+  /// Of a sub-step over the one before. While liquid bounces its pressure comes and goes, and the solver's limit with
+  /// it.
   static constexpr double largest_growth = 1.03;
 
   using InletWithOrigin = std::pair<Inlet, Origin>;
   using Watched = std::pair<BodyId, std::shared_ptr<const Cavity>>;
 
   template <class Part>
-  static constexpr bool wants_correction = requires { requires Part::uses_gradient_correction; };
+  static constexpr bool wants_correction = requires {
+    requires Part::uses_gradient_correction;
+  };
   template <class Force>
-  static constexpr bool acts_after_pressure = requires { requires Force::acts_after_pressure; };
+  static constexpr bool acts_after_pressure = requires {
+    requires Force::acts_after_pressure;
+  };
   static constexpr bool corrects_gradients =
       wants_correction<Solver> || []<class... Terms>(std::type_identity<std::tuple<Terms...>>) {
         return (wants_correction<Terms> || ...);
@@ -449,9 +425,7 @@ class Simulator {
     const Step step = view(longest);
     longest = std::min(longest, static_cast<double>(solver_.largest_step(step)));
     std::apply(
-        [&](auto&... terms) {
-          ((longest = std::min(longest, static_cast<double>(terms.largest_step(step)))), ...);
-        },
+        [&](auto&... terms) { ((longest = std::min(longest, static_cast<double>(terms.largest_step(step)))), ...); },
         forces_);
     if (!(longest > 0) || left / longest > settings_.most_sub_steps - taken + 1) {
       return 0;
@@ -536,40 +510,7 @@ class Simulator {
     }
     neighbors_.build_from(search_, fluid_.position, settings_.threads);
     bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
-    shield_neighbors();
-  }
-
-  /// Liquid on two sides of a wall must not feel each other.
-  void shield_neighbors() noexcept {
-    if (bodies_.size() == 0) {
-      return;
-    }
-    neighbors_.remove_if([&](Index i, Index j) { return behind(i, j) && hidden(i, j); }, settings_.threads);
-  }
-
-  /// Cheap first questions, of which a pair that a wall separates passes both: the two are farther apart than both
-  /// walls are near, and one of them is behind the plane that touches the wall nearest to the other.
-  bool behind(Index i, Index j) const noexcept {
-    if (walls_.contact_count[i] == 0 && walls_.contact_count[j] == 0) {
-      return false;
-    }
-    const Vector3<Scalar> apart = fluid_.position.col(j) - fluid_.position.col(i);
-    // looked-up distances may be off by a fraction of a grid cell; a tenth covers that
-    const Scalar walls_between = Scalar(0.9) * (walls_.distance[i] + walls_.distance[j]);
-    return apart.squaredNorm() > walls_between * walls_between && (beyond_wall_of(i, apart) || beyond_wall_of(j, -apart));
-  }
-  bool beyond_wall_of(Index i, const Vector3<Scalar>& apart) const noexcept {
-    const Vector3<Scalar> into = walls_.gradient.col(i);
-    const Scalar depth = apart.dot(into);
-    const Scalar reach = Scalar(0.5) * walls_.distance[i];
-    return depth > 0 && depth * depth > reach * reach * into.squaredNorm();
-  }
-  bool hidden(Index i, Index j) const noexcept {
-    // the same question from both ends, so that pairs stay symmetric
-    const Index a = std::min(i, j), b = std::max(i, j);
-    const Vector3<Scalar> x_a = fluid_.position.col(a), x_b = fluid_.position.col(b);
-    return bodies_.separated(x_a, x_b, walls_.contacts_of(a), walls_.contact_count[a]) ||
-           bodies_.separated(x_a, x_b, walls_.contacts_of(b), walls_.contact_count[b]);
+    shield_neighbors(bodies_, walls_, fluid_.position, neighbors_, settings_.threads);
   }
 
   void compute_densities() noexcept {
@@ -597,9 +538,8 @@ class Simulator {
     report.guarded += guard.slid + guard.stopped;
     report.lost += guard.lost;
     if constexpr (Domain::periodic) {
-      parallel_for(fluid_.size(), settings_.threads, [&](Index i) {
-        fluid_.position.col(i) = domain_.wrap(Vector3<Scalar>(fluid_.position.col(i)));
-      });
+      parallel_for(fluid_.size(), settings_.threads,
+                   [&](Index i) { fluid_.position.col(i) = domain_.wrap(Vector3<Scalar>(fluid_.position.col(i))); });
     }
   }
 

@@ -34,10 +34,10 @@ struct LooseLiquid {
   WallState<Scalar> walls{};
   GradientCorrection<Scalar> correction{};
   Growable<Scalar, 3> shift{};
-  Scalar spacing = Scalar(0.005);        ///< [m]
+  Scalar spacing = Scalar(0.005);           ///< [m]
   Scalar smoothing_length = Scalar(0.005);  ///< [m]
-  Scalar rest_density = Scalar(1000);    ///< [kg/m^3]
-  Scalar time_step = Scalar(1e-3);       ///< [s]
+  Scalar rest_density = Scalar(1000);       ///< [kg/m^3]
+  Scalar time_step = Scalar(1e-3);          ///< [s]
   Threads threads{1};
 
   /// Puts particles of one spacing's volume at these places, at rest, and finds neighbours and densities. Benchmarks
@@ -65,7 +65,8 @@ struct LooseLiquid {
     update<Search>();
   }
 
-  /// Finds neighbours and densities again after positions have changed. @param margin see PressureSolver::search_margin.
+  /// Finds neighbours and densities again after positions have changed. @param margin see
+  /// PressureSolver::search_margin.
   template <class Search = BruteForce<Scalar>>
   void update(double margin = 0) {
     Search search;
@@ -83,14 +84,14 @@ struct LooseLiquid {
   }
 
   StepView<Kernel, Neighbors> view() {
-    return {fluid, neighbors, walls, correction, shift, smoothing_length, spacing, rest_density, time_step, 0.0, threads};
+    return {fluid,   neighbors,    walls,     correction, shift,  smoothing_length,
+            spacing, rest_density, time_step, 0.0,        threads};
   }
 };
 
 /// A ball of liquid on a disturbed lattice, with velocities that vary from particle to particle. The same every time.
 template <class Kernel>
-LooseLiquid<Kernel> loose_ball(typename Kernel::Scalar spacing, int radius_in_spacings, double disorder,
-                               double speed) {
+LooseLiquid<Kernel> loose_ball(typename Kernel::Scalar spacing, int radius_in_spacings, double disorder, double speed) {
   using Scalar = typename Kernel::Scalar;
   LooseLiquid<Kernel> liquid;
   liquid.spacing = spacing;
@@ -172,10 +173,12 @@ std::vector<Law> force_laws(Force force, Keeps keeps) {
   };
   // each particle's sum carries rounding of some thirty terms, larger than itself by the terms' cancellation
   if (keeps != Keeps::neither) {
-    laws.push_back({"linear momentum is kept, relative to the sum of all forces", momentum.norm() / size, 100 * rounding});
+    laws.push_back(
+        {"linear momentum is kept, relative to the sum of all forces", momentum.norm() / size, 100 * rounding});
   }
   if (keeps == Keeps::linear_and_angular) {
-    laws.push_back({"angular momentum is kept, relative to the sum of all torques", angular.norm() / lever, 100 * rounding});
+    laws.push_back(
+        {"angular momentum is kept, relative to the sum of all torques", angular.norm() / lever, 100 * rounding});
   }
 
   const Scalar longest = force.largest_step(liquid.view());

@@ -23,16 +23,15 @@ class ViscousPair {
     strength_ = 225 * std::numbers::inv_pi_v<Scalar> / (squared * squared * support);
   }
 
-  /// Times nu (m_j / rho_0) (v_ij . x_ij) (-x_ij), this is the acceleration by the pair [m^-5].
+  /// The weight [m^-7]: times nu (m_j / rho_0) (v_ij . x_ij) (-x_ij), it is the acceleration by the pair.
   [[gnu::always_inline]] Batch<Scalar> operator()(Batch<Scalar> distance_squared) const noexcept {
-    const Batch<Scalar> hat =
-        maximum(1 - per_support_ * square_root(distance_squared), Batch<Scalar>(Scalar(0)));
+    const Batch<Scalar> hat = maximum(1 - per_support_ * square_root(distance_squared), Batch<Scalar>(Scalar(0)));
     // particles at one place have no line between them
     return strength_ * hat / (distance_squared + least_squared_);
   }
 
-  /// Sum over a lattice of V_j r^2 times the weight, three halves of the largest eigenvalue of the pair operator over nu
-  /// [1/m^2].
+  /// Sum over a lattice of V_j r^2 times the weight, three halves of the largest eigenvalue of the pair operator over
+  /// nu [1/m^2].
   Scalar stiffness(Scalar spacing) const noexcept {
     const int reach = static_cast<int>(support_ * (1 / spacing));
     Scalar total = 0;
