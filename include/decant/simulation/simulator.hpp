@@ -27,6 +27,7 @@
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 #include <decant/pressure/concept.hpp>
+#include <decant/pressure/position_based.hpp>
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/liquid.hpp>
 #include <decant/simulation/parts.hpp>
@@ -250,6 +251,53 @@ class Simulator {
     return report;
   }
 
+  /// Takes over places that a corrector gave the particles. Where a wall stands in the straight way from where they
+  /// were, the move ends at the wall; a move of more than `longest_path` [m] counts as taken from one place to another,
+  /// and only must not end inside a body. What then is too dense is pushed apart in `sweeps` sweeps of PositionBased,
+  /// 0 for none. Velocities stay as they are, time does not advance, particles may come into another order.
+  /// @param before 3xN [m], where the particles were, in the order of fluid(). @return how many moves were cut short.
+  Index adopt_moves(const ConstPointsView<Scalar>& before, double longest_path, int sweeps) noexcept {
+    bodies_.set_interval(time_, 0);
+    before_ = before;
+    const auto farthest = static_cast<Scalar>(longest_path * longest_path);
+    bool taken_elsewhere = false;
+    for (Index i = 0; i < fluid_.size(); ++i) {
+      if (!fluid_.position.col(i).allFinite()) {
+        fluid_.position.col(i) = before_.col(i);
+      } else if ((fluid_.position.col(i) - before_.col(i)).squaredNorm() > farthest) {
+        before_.col(i) = fluid_.position.col(i);
+        taken_elsewhere = true;
+      }
+    }
+    if (taken_elsewhere) {
+      kept_velocity_ = fluid_.velocity;
+      for (BodyId body = 0; body < bodies_.size(); ++body) {
+        bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+      }
+      fluid_.velocity = kept_velocity_;
+      for (Index i = 0; i < fluid_.size(); ++i) {
+        if ((fluid_.position.col(i) - before_.col(i)).squaredNorm() > farthest) {
+          before_.col(i) = fluid_.position.col(i);
+        }
+      }
+    }
+    bodies_.sample(before_, settings_.spacing, settings_.threads, walls_);
+    Index cut_short = keep_on_sides();
+    if (sweeps > 0 && fluid_.size() > 0) {
+      find_neighbors();
+      kept_velocity_ = fluid_.velocity;
+      fluid_.velocity.setZero();
+      apart_.most_iterations = sweeps;
+      PressureReport report;
+      apart_.solve(view(1), report);
+      before_ = fluid_.position;
+      fluid_.position += fluid_.velocity;
+      fluid_.velocity = kept_velocity_;
+      cut_short += keep_on_sides();
+    }
+    return cut_short;
+  }
+
   // ---- what there is ----------------------------------------------------------------------------------------------
 
   /// The particles; may be read and written between frames (positions, velocities), without a copy. To add or remove
@@ -261,6 +309,7 @@ class Simulator {
   const SimulatorSettings& settings() const noexcept { return settings_; }
   const Domain& domain() const noexcept { return domain_; }
   double time() const noexcept { return time_; }                          ///< [s]
+  double spacing() const noexcept { return settings_.spacing; }           ///< of particles [m]
   double smoothing_length() const noexcept { return smoothing_length_; }  ///< [m]
 
   /// A part, to read or change its settings.
@@ -543,6 +592,14 @@ class Simulator {
     }
   }
 
+  /// The guard for moves that are not motion: from before_, at walls that stand, without a change of velocities.
+  Index keep_on_sides() noexcept {
+    kept_velocity_ = fluid_.velocity;
+    const GuardReport guard = bodies_.guard(before_, 0, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    fluid_.velocity = kept_velocity_;
+    return guard.slid + guard.stopped + guard.lost;
+  }
+
   /// Puts the particles into another order: place k gets what was at order[k].
   void reorder(std::span<const std::uint32_t> order) {
     fluid_.each([&](auto& array) {
@@ -653,6 +710,8 @@ class Simulator {
   // scratch, and the state before the frame for frames that fail
   PointArray<Scalar> acceleration_{};
   Growable<Scalar, 3> before_{};
+  Growable<Scalar, 3> kept_velocity_{};
+  PositionBased<Scalar> apart_{};
   Growable<Scalar, 3> shift_{};
   Growable<Scalar, 3> scratch_points_{};
   Growable<Scalar, 1> scratch_scalars_{};
