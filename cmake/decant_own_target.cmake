@@ -25,7 +25,7 @@ function(decant_own_target target)
     target_compile_options(${target} PRIVATE -march=native)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
       # GCC's own AVX-512 intrinsics look uninitialised to it (GCC bug 105593); the preset `dev` keeps the warning
-      target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)
+      target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized -Wno-uninitialized)
     endif()
   endif()
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)

@@ -48,6 +48,7 @@
 #include <decant/neighbor/neighbor_list.hpp>
 #include <decant/pressure/dfsph.hpp>
 #include <decant/pressure/position_based.hpp>
+#include <decant/pressure/stable_step.hpp>
 #include <decant/pressure/state_equation.hpp>
 #include <decant/pressure/state_equation_schenck2017.hpp>
 #include <decant/simulation/contents.hpp>

@@ -15,6 +15,7 @@
 #include <decant/pressure/complementarity_solver.hpp>
 #include <decant/pressure/concept.hpp>
 #include <decant/pressure/pressure_system.hpp>
+#include <decant/pressure/stable_step.hpp>
 
 namespace decant {
 
@@ -69,13 +70,6 @@ class Dfsph {
 
   Memory& memory() noexcept { return memory_; }
 
-  /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
-  /// down) with the stiffness p / (rho d^2), and the sub-step integrates that explicitly. With ResidualViscosity acting
-  /// after the pressure, columns of forty layers stand still at 0.4 d / sqrt(p / rho), and collapse into themselves at
-  /// 0.5; without it, at 0.35. Taken for twice the mean pressure of what is under pressure, which is the largest of a
-  /// liquid at rest. Liquid that is too dense all the same, after an impact on a deep pool for one, needs steps in
-  /// which particles move little against each other: at a third of the usual and below, even what has collapsed stands
-  /// up again.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
     double total = 0, under_pressure = 0;
@@ -83,17 +77,8 @@ class Dfsph {
       total += static_cast<double>(term);
       under_pressure += term > 0 ? 1 : 0;
     }
-    if (!(total > 0)) {
-      return std::numeric_limits<Scalar>::infinity();
-    }
-    double excess = 0;
-    for (Index i = 0; i < step.fluid.size(); ++i) {
-      excess += static_cast<double>(std::max(step.fluid.density[i] / step.rest_density - 1, Scalar(0)));
-    }
-    excess /= static_cast<double>(step.fluid.size());
-    const double caution = std::clamp(3 * static_cast<double>(density_tolerance) / excess, 0.15, 1.0);
-    const double mean = total / under_pressure * static_cast<double>(step.rest_density);
-    return static_cast<Scalar>(caution * stability_share * static_cast<double>(step.spacing) / std::sqrt(2 * mean));
+    const double mean = total > 0 ? total / under_pressure * static_cast<double>(step.rest_density) : 0;
+    return largest_stable_step(step, mean, static_cast<double>(density_tolerance));
   }
 
   template <class Step>
@@ -165,7 +150,6 @@ class Dfsph {
  private:
   enum class Flag : std::uint8_t { no, yes };  // vector<bool> shares bytes between threads
 
-  static constexpr double stability_share = 0.3;                                 ///< see largest_step
   static constexpr Scalar contact_room = Scalar(0.1), loose_room = Scalar(0.2);  ///< of rest density
   static constexpr Scalar largest_correction = Scalar(0.05);                     ///< of rest density, per sub-step
   static constexpr Scalar largest_shift = Scalar(0.2);                           ///< spacings, per sub-step

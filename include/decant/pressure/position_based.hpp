@@ -15,6 +15,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/concept.hpp>
+#include <decant/pressure/stable_step.hpp>
 
 namespace decant {
 
@@ -26,7 +27,8 @@ namespace decant {
 /// far, and no more (the paper applies C_i of either sign or of positive sign only). Pair moves are mutual, so momentum
 /// is kept to rounding. Neighbours are those of the start, found a little beyond the support; walls enter linearised,
 /// phi(x*) = phi(x) + grad phi . (x* - x) - dt flux, and mirror lambda as they mirror pressure in PressureSystem.
-/// Robust with large steps, with an error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy.
+/// An error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy. Not for larger steps either:
+/// beyond largest_step water in a cup throws itself out.
 template <class ScalarType>
 class PositionBased {
  public:
@@ -50,8 +52,15 @@ class PositionBased {
   Memory& memory() noexcept { return memory_; }
 
   template <class Step>
-  Scalar largest_step(const Step&) const noexcept {
-    return std::numeric_limits<Scalar>::infinity();
+  Scalar largest_step(const Step& step) const noexcept {
+    double total = 0, under_pressure = 0;
+    for (Index i = 0; i < step.fluid.size(); ++i) {
+      total += static_cast<double>(step.fluid.pressure[i]);
+      under_pressure += step.fluid.pressure[i] > 0 ? 1 : 0;
+    }
+    const double mean = total > 0 ? total / (under_pressure * static_cast<double>(step.rest_density)) : 0;
+    // shorter steps would turn what is too dense into speed: it is moved apart within one, however short
+    return largest_stable_step(step, mean, std::numeric_limits<double>::infinity());
   }
 
   template <class Step>

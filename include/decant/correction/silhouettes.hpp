@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What a frame's cameras saw of the liquid, beside what the simulation says they should have seen.
+
+#include <cstdint>
+#include <span>
+
+#include <decant/camera/posed_camera.hpp>
+#include <decant/core/image.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
+
+namespace decant {
+
+/// One camera in one frame. Owns nothing; images are the camera's height x width.
+template <class CameraType>
+struct SilhouetteView {
+  const PosedCamera<CameraType>* camera = nullptr;
+  const Mask* observed = nullptr;        ///< liquid by the segmentation, cleaned of specks
+  const Mask* predicted = nullptr;       ///< liquid by the simulation as it is now
+  const Image<float>* coverage = nullptr;    ///< how many particles cover each pixel
+  const Image<float>* wall_depth = nullptr;  ///< of the first body at each pixel [m], infinity where there is none
+  std::span<const std::uint8_t> hidden{};    ///< N, 1 for particles that a body hides from this camera
+};
+
+/// The observation of correctors that go by silhouettes. Views are those of the cameras that have something to say in
+/// this frame: no mask, no view.
+template <class CameraType>
+struct Silhouettes {
+  using Camera = CameraType;
+
+  std::span<const SilhouetteView<Camera>> views{};
+  int pass = 0;                               ///< 0 .. passes - 1: which of the corrector's passes this is
+  double spacing = 0;                         ///< of particles [m]
+  Vector3<double> gravity{0, 0, -9.81};       ///< [m/s^2]
+  Threads threads{};
+};
+
+}  // namespace decant
