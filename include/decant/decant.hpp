@@ -19,8 +19,16 @@
 #include <decant/boundary/swept_contact.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/boundary/wall_function.hpp>
+#include <decant/camera/affine_registered_camera.hpp>
 #include <decant/camera/concept.hpp>
+#include <decant/camera/depth_buffer.hpp>
+#include <decant/camera/distorted_pinhole_camera.hpp>
+#include <decant/camera/no_occlusion.hpp>
+#include <decant/camera/occlusion_concept.hpp>
+#include <decant/camera/orthographic_camera.hpp>
 #include <decant/camera/pinhole_camera.hpp>
+#include <decant/camera/posed_camera.hpp>
+#include <decant/camera/ray_occlusion.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/domain.hpp>
 #include <decant/core/expects.hpp>

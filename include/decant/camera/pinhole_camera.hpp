@@ -13,6 +13,8 @@ namespace decant {
 /// Central projection: u = fx x/z + cx, v = fy y/z + cy.
 class PinholeCamera {
  public:
+  static constexpr bool has_affine_rays = true;
+
   /// @param fx,fy focal lengths [px], > 0. @param cx,cy where the optical axis meets the image [px].
   /// @param width,height of the image [px], 1 to 32768. Throws std::invalid_argument.
   PinholeCamera(double fx, double fy, double cx, double cy, int width, int height)
@@ -21,13 +23,13 @@ class PinholeCamera {
     expects(fy > 0 && std::isfinite(fy), "PinholeCamera: fy [px]", "> 0", fy);
     expects(std::isfinite(cx), "PinholeCamera: cx [px]", "finite", cx);
     expects(std::isfinite(cy), "PinholeCamera: cy [px]", "finite", cy);
-    expects(width >= 1 && width <= largest_side, "PinholeCamera: width [px]", "1 to 32768", width);
-    expects(height >= 1 && height <= largest_side, "PinholeCamera: height [px]", "1 to 32768", height);
+    expects(width >= 1 && width <= detail::largest_image_side, "PinholeCamera: width [px]", "1 to 32768", width);
+    expects(height >= 1 && height <= detail::largest_image_side, "PinholeCamera: height [px]", "1 to 32768", height);
   }
 
   Projection project(const Vector3<double>& x_in_camera) const noexcept {
     Projection seen;
-    if (!projectable(x_in_camera)) {
+    if (!detail::before_camera(x_in_camera)) {
       return seen;
     }
     seen.depth = x_in_camera.z();
@@ -42,7 +44,7 @@ class PinholeCamera {
 
   Eigen::Matrix<double, 2, 3> jacobian(const Vector3<double>& x_in_camera) const noexcept {
     Eigen::Matrix<double, 2, 3> rate = Eigen::Matrix<double, 2, 3>::Zero();
-    if (projectable(x_in_camera)) {
+    if (detail::before_camera(x_in_camera)) {
       const double over_z = 1 / x_in_camera.z();
       rate << fx_ * over_z, 0, -fx_ * x_in_camera.x() * over_z * over_z,  //
           0, fy_ * over_z, -fy_ * x_in_camera.y() * over_z * over_z;
@@ -58,13 +60,6 @@ class PinholeCamera {
   int height() const noexcept { return height_; }
 
  private:
-  static constexpr int largest_side = 32768;
-
-  // closer than a micrometre, pixels would overflow what an int holds
-  static bool projectable(const Vector3<double>& x_in_camera) noexcept {
-    return x_in_camera.allFinite() && x_in_camera.z() > 1e-6;
-  }
-
   double fx_, fy_, cx_, cy_;
   int width_, height_;
 };

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Which points bodies hide from a camera: one ray for each point, against the bodies' surfaces.
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <decant/boundary/body_shape.hpp>
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/camera/concept.hpp>
+#include <decant/camera/detail/line_of_sight.hpp>
+#include <decant/camera/occlusion_concept.hpp>
+#include <decant/camera/pinhole_camera.hpp>
+#include <decant/camera/posed_camera.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/core/types.hpp>
+
+namespace decant {
+
+/// Sight lines against bounding-volume hierarchies (Schenck and Fox 2017, section IV). Rays go into each body's frame,
+/// so a body that moves costs a pose and nothing is built anew. Exact for every camera; surfaces hide from both sides.
+/// Set-up allocates; poses and questions do not. Shares the surfaces. Leave out bodies that can be looked through.
+template <class CameraType>
+class RayOcclusion {
+ public:
+  using Camera = CameraType;
+
+  /// @param margin [m], >= 0: a surface that a sight line meets within this distance of its point does not hide it, as
+  /// poses and meshes are never so exact that a drop on the camera's side of a wall is not sometimes a little inside of
+  /// it. Keep it below the thickness of walls: liquid behind a wall is then hidden by the wall's front, however closely
+  /// it lies against the back. Along the sight line, thus less across a wall that is seen at a slant.
+  /// Throws std::invalid_argument.
+  explicit RayOcclusion(PosedCamera<Camera> camera, double margin = 1e-3)
+      : camera_(std::move(camera)), margin_(margin) {
+    expects(margin >= 0 && std::isfinite(margin), "RayOcclusion: margin [m]", ">= 0 and finite", margin);
+  }
+
+  /// Takes one more body, built before or shared with a simulation. The number that is returned counts up from 0.
+  /// Throws std::invalid_argument if there is no surface.
+  std::uint32_t add(std::shared_ptr<const BoundingVolumeHierarchy> surface, const Pose& world_from_body = {}) {
+    expects(surface != nullptr, "RayOcclusion: surface of a body", "given", "none");
+    bodies_.push_back({std::move(surface), world_from_body, {}});
+    const auto body = static_cast<std::uint32_t>(bodies_.size() - 1);
+    set_pose(body, world_from_body);
+    return body;
+  }
+
+  /// Takes one more body of any shape; shapes of formulas hide by their meshes.
+  std::uint32_t add(const BodyShape& shape, const Pose& world_from_body = {}) {
+    return add(std::make_shared<const BoundingVolumeHierarchy>(shape.mesh), world_from_body);
+  }
+
+  /// Takes all bodies of a simulation, such as RigidBodies, where they are at a time [s]. On an occlusion that had no
+  /// bodies yet, they keep their numbers.
+  template <class Bodies>
+  requires requires(const Bodies& bodies) { bodies[std::uint32_t{}].surface; }
+  void add_bodies(const Bodies& bodies, double time) {
+    for (std::uint32_t body = 0; body < bodies.size(); ++body) {
+      add(bodies[body].surface, bodies[body].motion.at(time));
+    }
+  }
+
+  /// Moves all bodies that add_bodies took from the same simulation to where they are at a time [s]. Needs an occlusion
+  /// that has no others before them.
+  template <class Bodies>
+  void follow(const Bodies& bodies, double time) noexcept {
+    for (std::uint32_t body = 0; body < bodies.size() && body < bodies_.size(); ++body) {
+      set_pose(body, bodies[body].motion.at(time));
+    }
+  }
+
+  void set_pose(std::uint32_t body, const Pose& world_from_body) noexcept {
+    bodies_[body].world_from_body = world_from_body;
+    bodies_[body].body_from_camera =
+        detail::isometry_of(world_from_body).inverse() * detail::isometry_of(camera_.camera_from_world()).inverse();
+  }
+
+  void set_camera_pose(const Pose& camera_from_world) noexcept {
+    camera_.set_pose(camera_from_world);
+    for (std::uint32_t body = 0; body < bodies_.size(); ++body) {
+      set_pose(body, bodies_[body].world_from_body);
+    }
+  }
+
+  bool hidden(const Vector3<double>& x_in_world) const noexcept {
+    const Vector3<double> x = camera_.to_camera(x_in_world);
+    const Projection seen = camera_.camera().project(x);
+    if (!seen.projected()) {
+      return false;
+    }
+    const Vector3<double> begin = camera_.camera().unproject(seen.pixel, 0);
+    const Vector3<double> back = begin - x;
+    const double length = back.norm();
+    if (!(length > margin_)) {
+      return false;
+    }
+    const Vector3<double> end = x + (margin_ / length) * back;
+    for (const Body& body : bodies_) {
+      if (body.surface->any_hit(body.body_from_camera * end, body.body_from_camera * begin)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// Depth of the first surface that a pixel's sight line meets [m], nothing if it meets none.
+  std::optional<double> first_wall(const Eigen::Vector2d& pixel) const noexcept {
+    const Vector3<double> begin = camera_.camera().unproject(pixel, 0);
+    const Vector3<double> way = camera_.camera().unproject(pixel, 1) - begin;
+    std::optional<double> first;
+    for (const Body& body : bodies_) {
+      const double limit = first ? *first : detail::deepest(*body.surface, body.body_from_camera);
+      if (limit > 0) {
+        if (const auto depth = detail::first_depth(*body.surface, body.body_from_camera, begin, way, limit)) {
+          first = depth;
+        }
+      }
+    }
+    return first;
+  }
+
+  const PosedCamera<Camera>& camera() const noexcept { return camera_; }
+  double margin() const noexcept { return margin_; }
+  std::size_t size() const noexcept { return bodies_.size(); }
+
+ private:
+  struct Body {
+    std::shared_ptr<const BoundingVolumeHierarchy> surface;
+    Pose world_from_body;
+    Eigen::Isometry3d body_from_camera;
+  };
+
+  PosedCamera<Camera> camera_;
+  double margin_;
+  std::vector<Body> bodies_;
+};
+static_assert(Occlusion<RayOcclusion<PinholeCamera>>);
+
+}  // namespace decant
