@@ -26,6 +26,7 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/gradient_correction.hpp>
@@ -49,6 +50,11 @@
 #include <decant/pressure/position_based.hpp>
 #include <decant/pressure/state_equation.hpp>
 #include <decant/pressure/state_equation_schenck2017.hpp>
+#include <decant/projector/concept.hpp>
+#include <decant/projector/disc_splat.hpp>
+#include <decant/projector/gap_closing.hpp>
+#include <decant/projector/projected_sphere.hpp>
+#include <decant/projector/silhouette.hpp>
 #include <decant/simulation/contents.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/gauges.hpp>
