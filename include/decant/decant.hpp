@@ -35,8 +35,11 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
+#include <decant/coverage/mask_cleaning.hpp>
+#include <decant/coverage/silhouette_distance.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
 #include <decant/force/residual_viscosity.hpp>
@@ -59,6 +62,11 @@
 #include <decant/pressure/stable_step.hpp>
 #include <decant/pressure/state_equation.hpp>
 #include <decant/pressure/state_equation_schenck2017.hpp>
+#include <decant/projector/concept.hpp>
+#include <decant/projector/disc_splat.hpp>
+#include <decant/projector/gap_closing.hpp>
+#include <decant/projector/projected_sphere.hpp>
+#include <decant/projector/silhouette.hpp>
 #include <decant/simulation/contents.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/gauges.hpp>
