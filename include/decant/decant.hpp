@@ -18,6 +18,8 @@
 #include <decant/boundary/swept_contact.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/boundary/wall_function.hpp>
+#include <decant/camera/affine_map.hpp>
+#include <decant/camera/affine_registration.hpp>
 #include <decant/camera/concept.hpp>
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/core/batch.hpp>
