@@ -21,7 +21,9 @@
 #include <decant/camera/affine_map.hpp>
 #include <decant/camera/affine_registration.hpp>
 #include <decant/camera/concept.hpp>
+#include <decant/camera/otsu_threshold.hpp>
 #include <decant/camera/pinhole_camera.hpp>
+#include <decant/camera/thermal_label.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/domain.hpp>
 #include <decant/core/expects.hpp>
