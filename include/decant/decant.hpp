@@ -61,4 +61,7 @@
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
 #include <decant/simulation/step_report.hpp>
+#include <decant/tracking/image_likelihood.hpp>
+#include <decant/tracking/overlap.hpp>
+#include <decant/tracking/overlap_score.hpp>
 #include <decant/version.hpp>
