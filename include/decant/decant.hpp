@@ -64,4 +64,5 @@
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/overlap.hpp>
 #include <decant/tracking/overlap_score.hpp>
+#include <decant/tracking/volume_error.hpp>
 #include <decant/version.hpp>
