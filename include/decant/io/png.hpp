@@ -86,6 +86,14 @@ inline PngHeader parse_png_header(std::string_view bytes, std::string_view name)
 
 namespace detail {
 
+/// Throws std::runtime_error, one line, where the image is of another size.
+inline void expect_png_size(const PngHeader& header, int width, int height, const std::string& name) {
+  if (header.width != width || header.height != height) {
+    refuse_file(name + ": size [px]", std::to_string(width) + " x " + std::to_string(height),
+                std::to_string(header.width) + " x " + std::to_string(header.height));
+  }
+}
+
 /// Takes a PNG apart with libpng's own calls: its simplified ones apply the file's gamma, which would change what a
 /// mask or a thermographic image says. Nothing in the members that libpng may leave by longjmp has a destructor.
 class PngDecoder {
