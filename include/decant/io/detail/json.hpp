@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
@@ -130,17 +131,32 @@ class JsonNode {
     return out;
   }
 
-  /// The file that this string names, which has to exist inside `folder`, links resolved.
-  std::filesystem::path file_inside(const std::filesystem::path& folder) const {
-    namespace fs = std::filesystem;
-    const fs::path relative = text(4096);
+  /// A whole number in [low, high], also where it is written as 3.0; `expected` says so in words.
+  std::int64_t whole_number(std::int64_t low, std::int64_t high, std::string_view expected) const {
+    const double value = number(static_cast<double>(low), static_cast<double>(high), expected);
+    if (value != std::floor(value)) {
+      refuse(expected);
+    }
+    return static_cast<std::int64_t>(value);
+  }
+
+  /// A path that does not leave the folder that it is relative to, as far as its text tells.
+  std::filesystem::path relative_path() const {
+    const std::filesystem::path relative = text(4096);
     bool inside = relative.is_relative();
-    for (const fs::path& part : relative) {
+    for (const std::filesystem::path& part : relative) {
       inside = inside && part != "..";
     }
     if (!inside) {
       refuse("a path that stays inside the file's folder");
     }
+    return relative;
+  }
+
+  /// The file that this string names, which has to exist inside `folder`, links resolved.
+  std::filesystem::path file_inside(const std::filesystem::path& folder) const {
+    namespace fs = std::filesystem;
+    const fs::path relative = relative_path();
     std::error_code error;
     const fs::path root = fs::canonical(folder.empty() ? fs::path(".") : folder, error);
     if (error) {
