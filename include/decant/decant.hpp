@@ -97,7 +97,9 @@
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 #include <decant/tracking/image_likelihood.hpp>
+#include <decant/tracking/liquid_model.hpp>
 #include <decant/tracking/overlap.hpp>
 #include <decant/tracking/overlap_score.hpp>
+#include <decant/tracking/tracker.hpp>
 #include <decant/tracking/volume_error.hpp>
 #include <decant/version.hpp>

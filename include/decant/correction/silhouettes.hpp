@@ -7,6 +7,7 @@
 #include <span>
 
 #include <decant/camera/posed_camera.hpp>
+#include <decant/camera/ray_occlusion.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
@@ -16,12 +17,13 @@ namespace decant {
 /// One camera in one frame. Owns nothing; images are the camera's height x width.
 template <class CameraType>
 struct SilhouetteView {
-  const PosedCamera<CameraType>* camera = nullptr;
-  const Mask* observed = nullptr;        ///< liquid by the segmentation, cleaned of specks
-  const Mask* predicted = nullptr;       ///< liquid by the simulation as it is now
-  const Image<float>* coverage = nullptr;    ///< how many particles cover each pixel
-  const Image<float>* wall_depth = nullptr;  ///< of the first body at each pixel [m], infinity where there is none
-  std::span<const std::uint8_t> hidden{};    ///< N, 1 for particles that a body hides from this camera
+  const RayOcclusion<CameraType>* sight = nullptr;  ///< the camera where it is, among the bodies where they are
+  const Mask* observed = nullptr;                   ///< liquid by the segmentation, cleaned of specks
+  const Mask* predicted = nullptr;                  ///< liquid by the simulation as it is now
+  const Image<float>* coverage = nullptr;           ///< how many particles cover each pixel
+  std::span<const std::uint8_t> hidden{};           ///< N, 1 for particles that a body hides from this camera
+
+  const PosedCamera<CameraType>& camera() const noexcept { return sight->camera(); }
 };
 
 /// The observation of correctors that go by silhouettes. Views are those of the cameras that have something to say in

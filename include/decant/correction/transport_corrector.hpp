@@ -132,7 +132,7 @@ class TransportCorrector {
         return;
       }
       const Vector3<double> x = fluid.position.col(i).template cast<double>();
-      const Projection projection = view.camera->project(x);
+      const Projection projection = view.camera().project(x);
       if (!projection.visible) {
         return;
       }
@@ -143,7 +143,7 @@ class TransportCorrector {
       } else {
         d *= 1 - settings_.dead_zone_px / length;
       }
-      const Eigen::Matrix<double, 2, 3> jacobian = view.camera->jacobian(x);
+      const Eigen::Matrix<double, 2, 3> jacobian = view.camera().jacobian(x);
       Normal& normal = normal_[own];
       normal.square += jacobian.transpose() * jacobian;
       normal.wanted += jacobian.transpose() * d;

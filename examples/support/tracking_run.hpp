@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Runs a tracker over a recording and scores it: on the frame just assimilated, before its correction, and ahead.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/camera/distorted_pinhole_camera.hpp>
+#include <decant/core/expects.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/simulation/contents.hpp>
+#include <decant/simulation/fill.hpp>
+#include <decant/simulation/simulator.hpp>
+#include <decant/tracking/overlap_score.hpp>
+#include <decant/tracking/tracker.hpp>
+
+namespace example {
+
+struct TrackingOptions {
+  double spacing = 0.005;           ///< of the model's particles [m]
+  std::vector<double> forecasts{};  ///< how far ahead [s]
+  int frames_between_forecasts = 5;
+  int threads = 0;
+};
+
+/// One method on one recording.
+struct TrackingResult {
+  std::vector<double> iou, prior_iou;  ///< per frame, NaN where there was no mask
+  decant::OverlapScore posterior, prior;
+  std::vector<decant::OverlapScore> forecasts;  ///< for each of the options'
+  decant::OverlapScore against_truth;           ///< posterior against masks without noise, where there are any
+  double log_likelihood = 0;
+  std::vector<std::vector<double>> volume_ml;  ///< per body and frame
+  double relocated_ml = 0;
+  double physics_ms = 0, drawing_ms = 0, correction_ms = 0, relaxation_ms = 0;  ///< all frames together
+  std::size_t frames = 0;
+  decant::Index particles = 0;
+  std::string status = "ok";
+};
+
+inline decant::DistortedPinholeCamera camera_of(const decant::recording::View& view, int width, int height) {
+  const auto& d = view.distortion;
+  return {decant::PinholeCamera(view.fx, view.fy, view.cx, view.cy, width, height), {d[0], d[1], d[2], d[3], d[4]}};
+}
+
+/// The model as a recording says that it starts. Throws std::invalid_argument if the amount of liquid is not known.
+template <class Parts>
+decant::Simulator<Parts> model_of(const decant::Recording& recording, const TrackingOptions& options) {
+  using namespace decant;
+  SimulatorSettings settings;
+  settings.spacing = options.spacing;
+  settings.gravity = recording.gravity;
+  settings.liquid = {recording.liquid.density, recording.liquid.viscosity, recording.liquid.surface_tension};
+  settings.threads = {options.threads};
+  Simulator<Parts> model(settings);
+  for (const recording::Body& body : recording.bodies) {
+    const BodyId id = model.add_body(body.name, body.mesh, PoseTrack(body.motion.at(recording.timestamps.front())));
+    if (body.role == recording::Role::Source || body.role == recording::Role::Target) {
+      model.watch_contents(id);
+    }
+  }
+  if (recording.liquid.initial) {
+    const auto& initial = *recording.liquid.initial;
+    expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
+    const FillAmount amount = initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction)
+                                                    : FillAmount::volume(*initial.volume);
+    if (amount.value > 0) {
+      decant::fill(model, static_cast<BodyId>(initial.body), amount);
+    }
+  }
+  if (recording.liquid.inlet) {
+    model.add_inlet(*recording.liquid.inlet, static_cast<Origin>(recording.bodies.size()));
+  }
+  return model;
+}
+
+/// A recorded motion on the model's clock, beginning where the model's body is now.
+template <class Model>
+decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Model& model, decant::BodyId body) {
+  std::vector<decant::PoseTrack::Sample> samples{{model.time(), model.bodies()[body].motion.at(model.time())}};
+  for (const auto& sample : motion.samples()) {
+    if (sample.time + by > model.time() + 1e-9) {
+      samples.push_back({sample.time + by, sample.pose});
+    }
+  }
+  return decant::PoseTrack(std::move(samples));
+}
+
+/// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for scoring.
+template <class Model, class CorrectorType>
+TrackingResult track_recording(const decant::Recording& recording, const Model& model, CorrectorType corrector,
+                               const TrackingOptions& options, const std::filesystem::path& truth_masks = {},
+                               const std::function<void(std::size_t)>& progress = [](std::size_t) {}) {
+  using namespace decant;
+  TrackerSettings settings;
+  settings.gravity = recording.gravity;
+  settings.threads = {options.threads};
+  Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
+  for (const recording::Camera& camera : recording.cameras) {
+    const recording::View& view = camera.view(0);
+    tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
+  }
+  TrackingResult result;
+  result.forecasts.resize(options.forecasts.size());
+  result.volume_ml.resize(recording.bodies.size());
+  const double start = recording.timestamps.front() - model.time();
+  std::vector<TrackedPose> poses(recording.bodies.size());
+  for (std::size_t frame = 0; frame < recording.frames; ++frame) {
+    const double time = recording.timestamps[frame];
+    for (std::size_t body = 0; body < poses.size(); ++body) {
+      poses[body] = {static_cast<BodyId>(body), recording.bodies[body].motion.at(time)};
+    }
+    std::vector<Mask> kept;
+    std::vector<CameraMask> masks;
+    kept.reserve(recording.cameras.size());
+    for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
+      if (std::optional<Mask> mask = recording.mask(frame, camera)) {
+        kept.push_back(std::move(*mask));
+        masks.push_back({camera, kept.back()});
+      }
+    }
+    const FrameReport report = tracker.track({time - start, poses, masks});
+    if (!report.advanced()) {
+      result.status = std::string(to_string(report.status)) + " in frame " + std::to_string(frame);
+      break;
+    }
+    ++result.frames;
+    result.iou.push_back(report.posterior.iou());
+    result.prior_iou.push_back(report.prior.iou());
+    result.posterior.add(report.posterior);
+    result.prior.add(report.prior);
+    if (report.posterior.compared_px > 0) {
+      result.log_likelihood += report.log_likelihood;
+    }
+    result.relocated_ml += 1e6 * report.relocated_volume;
+    result.physics_ms += report.physics_ms;
+    result.drawing_ms += report.drawing_ms;
+    result.correction_ms += report.correction_ms;
+    result.relaxation_ms += report.relaxation_ms;
+    if (!truth_masks.empty()) {
+      const auto file = truth_masks / (decant::detail::six_digits(frame) + ".png");
+      result.against_truth.add(overlap(tracker.predicted(0), read_png_grey8(file)));
+    }
+    for (std::size_t k = 0; k < options.forecasts.size(); ++k) {
+      const double ahead = options.forecasts[k];
+      const auto target = static_cast<std::size_t>(std::lround(static_cast<double>(frame) + ahead * recording.frames_per_second));
+      if (frame % static_cast<std::size_t>(options.frames_between_forecasts) != 0 || target >= recording.frames) {
+        continue;
+      }
+      Mask seen = Mask::Zero(recording.height, recording.width), forecast;
+      if (const std::optional<Mask> mask = recording.mask(target, 0)) {
+        MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(*mask, seen);
+        Model future = tracker.model();
+        for (std::size_t body = 0; body < poses.size(); ++body) {
+          future.set_motion(static_cast<BodyId>(body), shifted(recording.bodies[body].motion, -start, future, static_cast<BodyId>(body)));
+        }
+        if (future.step(recording.timestamps[target] - start - future.time()).advanced()) {
+          tracker.predict(future, 0, forecast);
+          result.forecasts[k].add(overlap(forecast, seen));
+        }
+      }
+    }
+    for (const auto& contained : tracker.model().step(0).contents) {
+      result.volume_ml[contained.body].push_back(1e6 * contained.volume);
+    }
+    progress(frame + 1);
+  }
+  result.particles = tracker.model().fluid().size();
+  return result;
+}
+
+}  // namespace example
