@@ -16,7 +16,8 @@ TEST_CASE("The orthographic camera has one scale at every depth") {
     CHECK(seen.depth == z);
     CHECK(seen.visible);
   }
-  CHECK_FALSE(camera.project({0.1, 0, -1e-9}).projected());
+  CHECK(camera.project({0.1, 0, -1e-9}).depth == 0);
+  CHECK_FALSE(camera.project({0.1, 0, -1e-9}).visible);
   CHECK_FALSE(camera.project({0.4, 0, 1}).visible);
   // sight begins on the image plane, straight before the point
   CHECK((camera.unproject({420, 190}, 0) - decant::Vector3<double>(0.1, -0.05, 0)).norm() < 1e-15);

@@ -184,6 +184,13 @@ TEST_CASE("A box hides what is behind its face") {
   CHECK(hidden > 500);
 }
 
+TEST_CASE("Behind the camera nothing is hidden, whatever stands there") {
+  const auto occlusion = before_shape(decant::Box{Point(-1, -1, -0.6), Point(1, 1, -0.5)}, 0);
+  CHECK_FALSE(occlusion.hidden(Point(0, 0, -1)));
+  CHECK_FALSE(occlusion.hidden(Point(0, 0, 1)));
+  CHECK_FALSE(occlusion.first_wall({80, 60}));
+}
+
 TEST_CASE("A wall does not hide what touches it on the camera's side, but does what touches it from behind") {
   for (const double turn : {0.0, 0.9}) {  // square, and at a slant
     RayOcclusion<PinholeCamera> occlusion{PosedCamera<PinholeCamera>(decant_test::pinhole)};

@@ -50,7 +50,6 @@ class AffineRegisteredCamera {
 
   Projection project(const Vector3<double>& x_in_camera) const noexcept {
     Projection seen = first_.project(x_in_camera);
-    seen.visible = false;
     if (seen.projected()) {
       seen.pixel = linear_from_first_ * (seen.pixel - first_from_second_.col(2));
       seen.visible = inside_image(seen.pixel, width_, height_);

@@ -13,7 +13,7 @@ namespace decant {
 
 /// Where a point falls in an image.
 struct Projection {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< (u, v) [px], u right, v down, (0, 0) is the top left pixel
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  ///< (u, v) [px], u right, v down, (0, 0) the top left one's centre
   double depth = 0;      ///< along the optical axis [m]; 0 for a point that the camera cannot project
   bool visible = false;  ///< projected, and inside the image; walls are not asked, see camera/occlusion_concept.hpp
 
@@ -23,8 +23,8 @@ struct Projection {
 
 /// A camera without its pose: it looks along +z, x is right in its image and y down. Points are in the camera's frame;
 /// camera_from_world = world_from_camera.inverse() takes them there. project(x_in_camera [m]) never throws and never
-/// returns NaN: what the camera cannot project (behind it, not finite, beyond what its lens takes in) has depth 0 and is
-/// not visible, with any finite pixel; all else has its z as depth, and is visible if inside_image.
+/// returns NaN: what the camera cannot project (behind it, not finite, beyond what its lens takes in) has depth 0 and
+/// is not visible, with any finite pixel; all else has its z as depth, and is visible if inside_image.
 /// unproject(pixel, depth) gives the point of that depth [m] that falls on that pixel, which may lie outside the image;
 /// both arguments must be finite. What falls on one pixel is a straight line: unproject(pixel, depth) is affine in the
 /// depth, and unproject(pixel, 0) is where sight begins, the centre of a pinhole or a point of an orthographic camera's

@@ -32,7 +32,8 @@ namespace decant {
 /// registered ones of these) triangles are drawn row by row, each pixel by its ray: which triangle, by the ray's side
 /// of the three edges, and how deep, by the triangle's plane. This is exact under perspective and needs no clipping: a
 /// triangle that reaches behind the camera is drawn where rays meet it before the camera. For other cameras (lenses
-/// that bend lines, cameras of one's own) each pixel's ray goes through the bodies' hierarchies, some ten times slower.
+/// that bend lines, cameras of one's own) each pixel's ray goes through the bodies' hierarchies, ten to
+/// thirty times slower.
 template <class CameraType>
 class DepthBuffer {
  public:

@@ -40,7 +40,7 @@ void find_hidden(const OcclusionType& occlusion, const ConstPointsView<Scalar>& 
 
 }  // namespace detail
 
-/// hidden[i] = 1 where point i is hidden, else 0. The result does not depend on the number of threads; allocates nothing.
+/// hidden[i] = 1 where point i is hidden, else 0, whatever the number of threads. Allocates nothing.
 /// @param position 3xN [m], world frame. @param hidden N entries.
 template <class OcclusionType>
 void find_hidden(const OcclusionType& occlusion, const ConstPointsView<double>& position, Threads threads,

@@ -3,7 +3,9 @@
 
 /// Which points bodies hide from a camera: one ray for each point, against the bodies' surfaces.
 
+#include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -76,6 +78,7 @@ class RayOcclusion {
   }
 
   void set_pose(std::uint32_t body, const Pose& world_from_body) noexcept {
+    assert(body < bodies_.size());
     bodies_[body].world_from_body = world_from_body;
     bodies_[body].body_from_camera =
         detail::isometry_of(world_from_body).inverse() * detail::isometry_of(camera_.camera_from_world()).inverse();
