@@ -29,8 +29,11 @@
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
+#include <decant/coverage/activation.hpp>
+#include <decant/coverage/image_kernel.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
+#include <decant/coverage/warp_sum.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
 #include <decant/force/residual_viscosity.hpp>
