@@ -29,7 +29,6 @@ double largest(const Mask& mask, const Image<float>& coverage) {
 }  // namespace
 
 TEST_CASE("Activation is the sum that the paper prints") {
-  const ImageKernel kernel;
   Mask mask = Mask::Zero(300, 300);
   Image<float> coverage = Image<float>::Zero(300, 300);
   CHECK(activation(mask, coverage, {150, 150}) == 0);

@@ -20,12 +20,13 @@
 
 namespace decant::detail {
 
-/// The four cubic B-splines that reach a place a fraction t of the way from one node to the next; they add up to 1.
-template <class Scalar>
-std::array<Scalar, 4> cubic_b_splines(Scalar t) noexcept {
-  constexpr Scalar sixth = Scalar(1) / 6;
-  const Scalar s = 1 - t;
-  return {sixth * s * s * s, sixth * (t * t * (3 * t - 6) + 4), sixth * (s * s * (3 * s - 6) + 4), sixth * t * t * t};
+/// The four cubic B-splines that reach a place a fraction t of the way from one node to the next. They add up to 1, and
+/// none is negative.
+inline Eigen::Array4f cubic_b_splines(float t) noexcept {
+  constexpr float a = 1.0f / 6, b = 0.5f;
+  const Eigen::Array4f constant(a, 4 * a, a, 0), linear(-b, 0, b, 0), square(b, -1, b, 0), cube(-a, b, -b, a);
+  // all four in one register; rounding may leave the first a hair below zero
+  return (constant + t * (linear + t * (square + t * cube))).max(0.0f);
 }
 
 /// How it works and how exact it is: see ActivationField. One grid sums W (Vector = false), or both components of u W.
@@ -60,10 +61,8 @@ class KernelGrid {
     phase_stride_ = source_columns_ + 4 + B::width;
 
     for (Index phase = 0; phase < step_; ++phase) {
-      const std::array<double, 4> spline = cubic_b_splines(static_cast<double>(phase) / step);
-      for (const double weight : spline) {
-        splines_.push_back(static_cast<float>(weight));
-      }
+      const Eigen::Array4f spline = cubic_b_splines(static_cast<float>(static_cast<double>(phase) / step));
+      splines_.insert(splines_.end(), spline.begin(), spline.end());
     }
     // exp(-u^2 / length^2) has the variance length^2 / 2 along each axis, and each of two cubic B-splines adds
     // step^2 / 3: the kernel between the splines is narrower by that much, and higher.
@@ -116,15 +115,14 @@ class KernelGrid {
       return {};
     }
     const auto left = static_cast<Index>(x), top = static_cast<Index>(y);
-    const std::array<float, 4> across = cubic_b_splines(static_cast<float>(x - static_cast<double>(left)));
-    const std::array<float, 4> down = cubic_b_splines(static_cast<float>(y - static_cast<double>(top)));
-    const Eigen::Map<const Eigen::Array4f> weights(across.data());
+    const Eigen::Array4f across = cubic_b_splines(static_cast<float>(x - static_cast<double>(left)));
+    const Eigen::Array4f down = cubic_b_splines(static_cast<float>(y - static_cast<double>(top)));
     std::array<double, channels> result;
     for (std::size_t channel = 0; channel < channels; ++channel) {
       const float* const node = sums_[channel].data() + (top - 1) * stride_ + left - 1;
       const auto row = [&](Index k) { return Eigen::Map<const Eigen::Array4f>(node + k * stride_); };
       const Eigen::Array4f column = down[0] * row(0) + down[1] * row(1) + down[2] * row(2) + down[3] * row(3);
-      result[channel] = static_cast<double>((column * weights).sum());
+      result[channel] = static_cast<double>((column * across).sum());
     }
     return result;
   }
