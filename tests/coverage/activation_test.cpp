@@ -90,7 +90,7 @@ TEST_CASE("The field is exact for kernels of other lengths and images of other s
       std::mt19937 generator(seed++);
       Mask mask(rows, columns);
       for (Index k = 0; k < mask.size(); ++k) {
-        mask.data()[k] = generator() % 3 == 0 || k == 0 ? 255 : 0;
+        mask.data()[k] = generator() % 3 == 0 || k == 0 ? 130 : 100;  // not only 0 and 255
       }
       const Image<float> coverage = decant_test::some_coverage(rows, columns, seed++);
       const ImageKernel kernel{length, cut};
