@@ -50,8 +50,11 @@
 #include <decant/correction/silhouette_transport.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/correction/transport_corrector.hpp>
+#include <decant/coverage/activation.hpp>
+#include <decant/coverage/image_kernel.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
+#include <decant/coverage/warp_sum.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>

@@ -85,6 +85,7 @@ TEST_CASE("A pixel counts if and only if its ray meets the sphere before the cam
   position.col(1) = Vector3<double>(0.3, 0.1, 0.02);      // through the plane of the eye
   position.col(2) = Vector3<double>(0.07, -0.02, 0.059);  // barely
   position.col(3) = Vector3<double>(0.02, -0.02, 0.0601);
+  position.col(4) = Vector3<double>(-0.0605, 0, 0.01);  // beside the eye: rays to the right pass it backward
   Image<float> expected = Image<float>::Zero(120, 160);
   for (Index i = 0; i < count; ++i) {
     if (!(position(2, i) > 0)) {
@@ -106,7 +107,7 @@ TEST_CASE("A pixel counts if and only if its ray meets the sphere before the cam
   }
   // spheres of a few pixels and fractions of one: the box around them must not cut any
   for (const double small : {0.0005, 0.003, 0.012}) {
-    const PointArray<double> rest = position.rightCols(count - 4);
+    const PointArray<double> rest = position.rightCols(count - 5);
     CHECK((drawn(ProjectedSphere<double>(small), rest, camera) == drawn(ProjectedSphere<double>(small), rest, foreign))
               .all());
   }

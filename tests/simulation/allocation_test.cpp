@@ -1,70 +1,19 @@
 // SPDX-License-Identifier: MIT
-// No allocation in the frame loop after warm-up. The replaced operators only count, and only while a frame is running,
-// so that other tests of the program are not disturbed. They are not inlined: GCC would see malloc meet delete and
-// warn.
+// No allocation in the frame loop after warm-up.
 
 #include <decant/simulation/simulator.hpp>
 
-#include <atomic>
 #include <cmath>
-#include <cstddef>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
 #include <decant/boundary/shapes.hpp>
 
+#include "allocation_count.hpp"
 #include "catch.hpp"
 
-namespace {
-
-std::atomic<bool> watching{false};
-std::atomic<long> allocations{0};
-
-void* allocate(std::size_t size) {
-  if (watching.load(std::memory_order_relaxed)) {
-    allocations.fetch_add(1, std::memory_order_relaxed);
-  }
-  return std::malloc(size == 0 ? 1 : size);
-}
-
-void* allocate_aligned(std::size_t size, std::align_val_t alignment) {
-  if (watching.load(std::memory_order_relaxed)) {
-    allocations.fetch_add(1, std::memory_order_relaxed);
-  }
-  const auto step = static_cast<std::size_t>(alignment);
-  return std::aligned_alloc(step, (size + step - 1) / step * step);
-}
-
-void* or_throw(void* place) {
-  if (place == nullptr) {
-    throw std::bad_alloc();
-  }
-  return place;
-}
-
-}  // namespace
-
-[[gnu::noinline]] void* operator new(std::size_t size) { return or_throw(allocate(size)); }
-[[gnu::noinline]] void* operator new[](std::size_t size) { return or_throw(allocate(size)); }
-[[gnu::noinline]] void* operator new(std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
-[[gnu::noinline]] void* operator new[](std::size_t size, const std::nothrow_t&) noexcept { return allocate(size); }
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
-  return or_throw(allocate_aligned(size, alignment));
-}
-[[gnu::noinline]] void* operator new[](std::size_t size, std::align_val_t alignment) {
-  return or_throw(allocate_aligned(size, alignment));
-}
-[[gnu::noinline]] void operator delete(void* place) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::size_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place, std::size_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::align_val_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place, std::align_val_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::size_t, std::align_val_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place, std::size_t, std::align_val_t) noexcept { std::free(place); }
-
 using namespace decant;
+using decant_test::allocations;
+using decant_test::watching;
 
 namespace {
 
