@@ -65,6 +65,9 @@ TEST_CASE("Overlap: counted by hand") {
   CHECK(all.differing_px() == 5);
   CHECK(all.agreeing_px() == 7);
   CHECK(all.iou() == Approx(2.0 / 7));
+  const decant::ConstMaskView view(predicted);
+  CHECK(noexcept(overlap(view, view)));
+  CHECK(noexcept(overlap(view, view, view)));
 
   Mask seen = Mask::Constant(3, 4, 255);
   seen.col(3).setZero();
@@ -101,8 +104,9 @@ TEST_CASE("Overlap: no liquid in either mask, nothing seen, no pixels, other siz
   CHECK(overlap(Mask(), Mask()).comparable);
   CHECK(overlap(Mask(0, 5), Mask(0, 5)).compared_px == 0);
   CHECK(overlap(Mask::Constant(1, 1, 255), Mask::Constant(1, 1, 255)).iou() == 1);
-  // as many pixels, in another shape
-  for (const Mask& other : {Mask(Mask::Constant(5, 4, 255)), Mask(Mask::Constant(4, 6, 255)), Mask()}) {
+  // as many pixels in another shape, then one side that differs
+  for (const Mask& other :
+       {Mask(Mask::Constant(5, 4, 255)), Mask(Mask::Constant(3, 5, 255)), Mask(Mask::Constant(4, 6, 255)), Mask()}) {
     CHECK_FALSE(overlap(all, other).comparable);
     CHECK_FALSE(overlap(other, all).comparable);
     CHECK_FALSE(overlap(all, all, other).comparable);
