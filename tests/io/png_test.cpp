@@ -114,8 +114,8 @@ TEST_CASE("png: masks of every kind of file") {
     CHECK((mask == (decant::Mask(1, 2) << 136, 255).finished()).all());
   }
   SECTION("16 bits") {
-    const auto mask = read(encoded(2, 1, 16, PNG_COLOR_TYPE_GRAY, {{0xFF, 0xFF, 0x80, 0x00}}));
-    CHECK((mask == (decant::Mask(1, 2) << 255, 128).finished()).all());
+    const auto mask = read(encoded(3, 1, 16, PNG_COLOR_TYPE_GRAY, {{0xFF, 0xFF, 0x80, 0x00, 0x00, 0xFF}}));
+    CHECK((mask == (decant::Mask(1, 3) << 255, 128, 1).finished()).all());
   }
   SECTION("grey with alpha") {
     const auto mask = read(encoded(2, 1, 8, PNG_COLOR_TYPE_GRAY_ALPHA, {{200, 0, 10, 255}}));

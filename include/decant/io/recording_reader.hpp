@@ -337,7 +337,7 @@ class RecordingFolder {
 
   /// Throws std::runtime_error where there is no such file, or where it lies elsewhere.
   std::string text(const std::filesystem::path& relative) const {
-    return read_text_file(file_inside(folder_, relative), bop_byte_limit);
+    return read_text_file(file_inside(folder_, relative), text_byte_limit);
   }
 
   bool has(const std::filesystem::path& relative) const { return find_inside(folder_, relative).has_value(); }

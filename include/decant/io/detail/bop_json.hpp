@@ -32,7 +32,8 @@ namespace decant::detail {
 
 inline constexpr std::size_t image_limit = 1000000;  // what six digits can name
 inline constexpr std::int64_t object_id_limit = 999999;
-inline constexpr std::uintmax_t bop_byte_limit = std::uintmax_t{1} << 28;
+inline constexpr std::uintmax_t text_byte_limit = std::uintmax_t{1}
+                                                  << 26;  // a document in memory takes some 20 times its text
 
 /// An instance of a model in one image.
 struct BopInstance {

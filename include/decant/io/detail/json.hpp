@@ -142,7 +142,7 @@ class JsonNode {
 
   /// A path that does not leave the folder that it is relative to, as far as its text tells.
   std::filesystem::path relative_path() const {
-    const std::filesystem::path relative = text(4096);
+    std::filesystem::path relative = text(4096);
     bool inside = relative.is_relative();
     for (const std::filesystem::path& part : relative) {
       inside = inside && part != "..";
