@@ -57,11 +57,16 @@ struct HiddenPhysics {
   std::string words() const {
     std::string text;
     const auto say = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
-    if (pull.norm() > 0) say("sideways pull");
-    if (drag > 0) say("drag");
-    if (sticky_walls) say("sticky walls");
-    if (kinematic_viscosity > 1e-6) say("thick liquid");
-    if (latency > 0) say("late poses");
+    if (pull.norm() > 0)
+      say("sideways pull");
+    if (drag > 0)
+      say("drag");
+    if (sticky_walls)
+      say("sticky walls");
+    if (kinematic_viscosity > 1e-6)
+      say("thick liquid");
+    if (latency > 0)
+      say("late poses");
     return text.empty() ? "nothing" : text;
   }
 };
@@ -72,7 +77,9 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
     return hidden;
   }
   std::mt19937 random(7919 * twin.seed + 13);
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
   const auto sign = [&] { return random() % 2 == 0 ? 1.0 : -1.0; };
   std::vector<int> kinds{0, 1, 2, 3, 4};
   std::shuffle(kinds.begin(), kinds.end(), random);
@@ -84,14 +91,21 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
         hidden.pull = {size * std::cos(angle), size * std::sin(angle), 0};
         break;
       }
-      case 1: hidden.drag = between(0.8, 1.6); break;
+      case 1:
+        hidden.drag = between(0.8, 1.6);
+        break;
       case 2:  // what a boundary layer does that is thinner than a particle
         hidden.sticky_walls = true;
         hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 1e-4);
         break;
-      case 3: hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.0, -3.3))); break;
-      case 4: hidden.latency = sign() > 0 ? between(0.07, 0.13) : between(0.05, 0.1); break;
-      default: break;
+      case 3:
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.0, -3.3)));
+        break;
+      case 4:
+        hidden.latency = sign() > 0 ? between(0.07, 0.13) : between(0.05, 0.1);
+        break;
+      default:
+        break;
     }
   }
   return hidden;
@@ -129,8 +143,8 @@ inline PourContainer pour_container(const std::string& name) {
   if (name == "bottle") {
     const double wall = 0.003;
     // inner outline from the floor to the mouth, then back outside
-    const std::vector<Eigen::Vector2d> inner{{0, 0}, {0.031, 0}, {0.033, 0.004}, {0.033, 0.085}, {0.030, 0.098},
-                                             {0.021, 0.112}, {0.018, 0.120}, {0.018, 0.140}};
+    const std::vector<Eigen::Vector2d> inner{{0, 0},         {0.031, 0},     {0.033, 0.004}, {0.033, 0.085},
+                                             {0.030, 0.098}, {0.021, 0.112}, {0.018, 0.120}, {0.018, 0.140}};
     std::vector<Eigen::Vector2d> profile;
     profile.emplace_back(0, -wall);
     for (std::size_t k = 1; k < inner.size(); ++k) {
@@ -146,15 +160,15 @@ inline PourContainer pour_container(const std::string& name) {
   return {cup.mesh(), {cup.rim_radius, 0, cup.height}};
 }
 
-inline decant::BodyShape pour_pan() {
-  return decant::CylinderInside{0.13, 0.045, 0.003, decant::Face::PositiveZ};
-}
+inline decant::BodyShape pour_pan() { return decant::CylinderInside{0.13, 0.045, 0.003, decant::Face::PositiveZ}; }
 
 /// How the container really moves: its lip stays near one place above the pan while it turns over and back, in a hand
 /// that shakes.
 inline decant::PoseTrack pour_motion(const PourTwin& twin, const decant::Vector3<double>& lip) {
   std::mt19937 random(twin.seed);
-  const auto between = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
   struct Wave {
     double size, frequency, phase;
   };
@@ -251,8 +265,10 @@ class MaskNoise {
 /// A pose that is off by `millimetres` and `degrees`, in a direction that the generator draws.
 inline decant::Pose off_by(const decant::Pose& pose, double millimetres, double degrees, std::mt19937& random) {
   std::normal_distribution<double> normal(0, 1);
-  const decant::Vector3<double> step = decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
-  const decant::Vector3<double> axis = decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
+  const decant::Vector3<double> step =
+      decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
+  const decant::Vector3<double> axis =
+      decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
   return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis) * pose.rotation,
           pose.translation + 1e-3 * millimetres * step};
 }
@@ -326,8 +342,8 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
     const double time = frame / twin.frames_per_second;
     StepReport report = reality.step(std::max(0.0, time - reality.time()));
     if (!report.advanced()) {
-      throw std::runtime_error("the reality stopped at " + std::to_string(time) + " s: " +
-                               std::string(to_string(report.status)));
+      throw std::runtime_error("the reality stopped at " + std::to_string(time) +
+                               " s: " + std::string(to_string(report.status)));
     }
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
@@ -367,8 +383,9 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
 
 /// Makes the recording in a new folder, with the clean silhouettes beside it (truth_mask/, for scoring alone).
 /// @param progress is told how far it is, 0 .. 1. Throws std::invalid_argument and std::runtime_error.
-inline void record_pour(const PourTwin& twin, const std::filesystem::path& folder,
-                        const std::function<void(double)>& progress = [](double) {}) {
+inline void record_pour(
+    const PourTwin& twin, const std::filesystem::path& folder,
+    const std::function<void(double)>& progress = [](double) {}) {
   decant::expects(twin.fill_fraction > 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in (0, 1]",
                   twin.fill_fraction);
   const HiddenPhysics hidden = draw_hidden_physics(twin);

@@ -71,8 +71,8 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
   if (recording.liquid.initial) {
     const auto& initial = *recording.liquid.initial;
     expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
-    const FillAmount amount = initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction)
-                                                    : FillAmount::volume(*initial.volume);
+    const FillAmount amount =
+        initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction) : FillAmount::volume(*initial.volume);
     if (amount.value > 0) {
       decant::fill(model, static_cast<BodyId>(initial.body), amount);
     }
@@ -95,11 +95,13 @@ decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Mode
   return decant::PoseTrack(std::move(samples));
 }
 
-/// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for scoring.
+/// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for
+/// scoring.
 template <class Model, class CorrectorType>
-TrackingResult track_recording(const decant::Recording& recording, const Model& model, CorrectorType corrector,
-                               const TrackingOptions& options, const std::filesystem::path& truth_masks = {},
-                               const std::function<void(std::size_t)>& progress = [](std::size_t) {}) {
+TrackingResult track_recording(
+    const decant::Recording& recording, const Model& model, CorrectorType corrector, const TrackingOptions& options,
+    const std::filesystem::path& truth_masks = {},
+    const std::function<void(std::size_t)>& progress = [](std::size_t) {}) {
   using namespace decant;
   TrackerSettings settings;
   settings.gravity = recording.gravity;
@@ -152,7 +154,8 @@ TrackingResult track_recording(const decant::Recording& recording, const Model& 
     }
     for (std::size_t k = 0; k < options.forecasts.size(); ++k) {
       const double ahead = options.forecasts[k];
-      const auto target = static_cast<std::size_t>(std::lround(static_cast<double>(frame) + ahead * recording.frames_per_second));
+      const auto target =
+          static_cast<std::size_t>(std::lround(static_cast<double>(frame) + ahead * recording.frames_per_second));
       if (frame % static_cast<std::size_t>(options.frames_between_forecasts) != 0 || target >= recording.frames) {
         continue;
       }
@@ -161,7 +164,8 @@ TrackingResult track_recording(const decant::Recording& recording, const Model& 
         MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(*mask, seen);
         Model future = tracker.model();
         for (std::size_t body = 0; body < poses.size(); ++body) {
-          future.set_motion(static_cast<BodyId>(body), shifted(recording.bodies[body].motion, -start, future, static_cast<BodyId>(body)));
+          future.set_motion(static_cast<BodyId>(body),
+                            shifted(recording.bodies[body].motion, -start, future, static_cast<BodyId>(body)));
         }
         if (future.step(recording.timestamps[target] - start - future.time()).advanced()) {
           tracker.predict(future, 0, forecast);

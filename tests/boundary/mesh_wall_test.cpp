@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 
 #include <cmath>
+#include <cstdint>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/mesh_wall.hpp>
@@ -99,6 +100,44 @@ TEST_CASE("mesh wall and solid parts agree in a corner") {
       CHECK(from_parts.share == Approx(from_mesh.share).margin(0.09));
       CHECK((from_parts.gradient - from_mesh.gradient).norm() < 0.25 * from_mesh.gradient.norm());
     }
+  }
+}
+
+TEST_CASE("close to the surface, where the grid has no answer, a mesh wall still is what it should be") {
+  decant::TriangleMesh corner = box_mesh({-0.05, -0.05, -0.01}, {0.05, 0.05, 0});
+  const auto upright = box_mesh({-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05});
+  const auto shift = static_cast<std::uint32_t>(corner.vertices.size());
+  corner.vertices.insert(corner.vertices.end(), upright.vertices.begin(), upright.vertices.end());
+  for (const auto& t : upright.triangles) {
+    corner.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  }
+  const decant::BoundingVolumeHierarchy surface(corner);
+  const auto wall = decant::MeshWall::of<Kernel>(surface, spacing, spacing, {});
+  const auto plane = decant::WallFunction::of<Kernel>(spacing, spacing);
+  // where one wall is all there is: the closed form, with what 128 directions leave of it (above)
+  const auto is_plane = [&](const Vector3<double>& x, double a, const Vector3<double>& toward) {
+    decant::WallSample sample;
+    REQUIRE(wall.sample(x, sample));
+    INFO("at [mm] " << 1e3 * x.transpose());
+    CHECK(sample.share == Approx(plane.share(a)).margin(0.006));
+    CHECK((sample.gradient - plane.slope(a) * toward).norm() < 0.025 * plane.slope(0));
+    CHECK(sample.distance == Approx(a).epsilon(1e-6));
+  };
+  // where two are, the sum over directions: the grid's value is not that of one wall more or less
+  const auto is_sum = [&](const Vector3<double>& x) {
+    decant::WallSample sample, sum;
+    REQUIRE(wall.sample(x, sample));
+    REQUIRE(wall.sample_directly(x, sum));
+    INFO("at [mm] " << 1e3 * x.transpose());
+    CHECK(sample.share == Approx(sum.share).margin(0.006));
+    CHECK((sample.gradient - sum.gradient).norm() < 0.025 * plane.slope(0));
+  };
+  for (const double a : {0.01, 0.05, 0.1, 0.2, 0.3}) {
+    is_plane({0.0113, -0.0021, a * spacing}, a * spacing, -Vector3<double>::UnitZ());         // on the floor
+    is_plane({0.0113, -0.0021, -0.01 - a * spacing}, a * spacing, Vector3<double>::UnitZ());  // below it
+    is_plane({-0.05 + a * spacing, 0.001, 0.0271}, a * spacing, -Vector3<double>::UnitX());   // at the upright
+    is_sum({-0.05 + a * spacing, 0.001, 0.4 * spacing});                                      // near the corner
+    is_sum({-0.05 + a * spacing, 0.001, 1.1 * a * spacing});                                  // in it
   }
 }
 

@@ -330,6 +330,26 @@ TEST_CASE("rigid bodies: speeds are relative to what moves") {
   CHECK(std::isnan(speed(bodies)));
 }
 
+TEST_CASE("rigid bodies: a drop that has left the scene shortens nobody's sub-steps") {
+  decant::Reduction<double> reduction;
+  RigidBodies<double> bodies;
+  add(bodies, CylinderInside{0.04, 0.06, 0.002, Face::PositiveZ}.mesh());
+  auto fluid = particles<double>({{0, 0, 0.02}, {0, 0, -2}});
+  fluid.velocity.col(0) << 0.5, 0, 0;
+  fluid.velocity.col(1) << 0, 0, -6;
+  const auto speed = [&](double duration) {
+    bodies.set_interval(0, duration);
+    return bodies.largest_relative_speed(fluid, Threads{1}, reduction);
+  };
+  CHECK(speed(0.01) == Approx(0.5));
+  CHECK(speed(1) == Approx(6));  // in this time it might come back
+  fluid.position.col(1) << 0, 0, -0.05;
+  CHECK(speed(0.01) == Approx(6));  // near
+  fluid.position(2, 1) = -2;
+  fluid.velocity(2, 1) = std::numeric_limits<double>::quiet_NaN();
+  CHECK(std::isnan(speed(0.01)));
+}
+
 TEMPLATE_TEST_CASE("rigid bodies: with sampled walls", "", float, double) {
   RigidBodies<TestType, SampledWall> bodies;
   add(bodies, CylinderInside{0.04, 0.06, 0.002, Face::PositiveZ}.mesh());

@@ -52,39 +52,14 @@ class MeshWall {
 
   /// False where no wall is within the support of x (in the body's frame).
   bool sample(const Vector3<double>& x, WallSample& result) const noexcept {
-    std::array<int, 3> cell;
-    Vector3<double> t;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double place = (x[axis] - origin_[axis]) / cell_;
-      if (!(place >= 0 && place < static_cast<double>(blocks_[static_cast<std::size_t>(axis)] * block_cells))) {
+    switch (look_up(x, result)) {
+      case LookUp::far:
         return false;
-      }
-      const auto at = static_cast<std::size_t>(axis);
-      cell[at] = static_cast<int>(place);
-      t[axis] = place - cell[at];
+      case LookUp::crossed:
+        return sample_close(x, result);
+      default:
+        return result.share > 0;
     }
-    const std::int32_t block =
-        block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
-    if (block < 0) {
-      return false;
-    }
-    const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
-    const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
-    if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
-      return sample_directly(x, result);  // the surface passes through this cell: its corners see different sides
-    }
-    NodeValues mean = NodeValues::Zero();
-    for (int corner = 0; corner < 8; ++corner) {
-      const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
-      const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
-      mean += weight * nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
-    }
-    result.share = plane_.share(mean[0]);
-    result.distance = mean[4];
-    const NodeValues scaled = plane_.slope(mean[0]) * mean;
-    result.gradient = scaled.segment<3>(1);
-    result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
-    return result.share > 0;
   }
 
   /// The sum over directions at x itself: slower by a factor of about a hundred, exact at any place.
@@ -117,6 +92,71 @@ class MeshWall {
   }
 
  private:
+  enum class LookUp { far, found, crossed };
+
+  /// From the grid; a cell that the surface passes through has corners that see different sides, and no answer.
+  LookUp look_up(const Vector3<double>& x, WallSample& result) const noexcept {
+    std::array<int, 3> cell;
+    Vector3<double> t;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double place = (x[axis] - origin_[axis]) / cell_;
+      if (!(place >= 0 && place < static_cast<double>(blocks_[static_cast<std::size_t>(axis)] * block_cells))) {
+        return LookUp::far;
+      }
+      const auto at = static_cast<std::size_t>(axis);
+      cell[at] = static_cast<int>(place);
+      t[axis] = place - cell[at];
+    }
+    const std::int32_t block =
+        block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
+    if (block < 0) {
+      return LookUp::far;
+    }
+    const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
+    const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
+    if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
+      return LookUp::crossed;
+    }
+    NodeValues mean = NodeValues::Zero();
+    for (int corner = 0; corner < 8; ++corner) {
+      const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
+      const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
+      mean += weight * nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
+    }
+    result.share = plane_.share(mean[0]);
+    result.distance = mean[4];
+    const NodeValues scaled = plane_.slope(mean[0]) * mean;
+    result.gradient = scaled.segment<3>(1);
+    result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
+    return LookUp::found;
+  }
+
+  /// Close to the surface: from the grid a little farther off it, with the part of the nearest wall, taken for a plane,
+  /// replaced by what it is at x. Where that wall is not nearly all there is (in corners, where each wall hides some of
+  /// what is behind the other) or there is no room to step back, the sum over directions.
+  bool sample_close(const Vector3<double>& x, WallSample& result) const noexcept {
+    // at a cell's diagonal from the surface no cell is crossed by it
+    const double clear = std::sqrt(3.0) * cell_;
+    const auto nearest = surface_->closest_point(x, clear);
+    if (!nearest || !(nearest->distance > 1e-3 * cell_)) {
+      return sample_directly(x, result);
+    }
+    const double distance = nearest->distance;
+    const Vector3<double> toward = (nearest->point - x) / distance;
+    const Vector3<double> back = x - (clear - distance) * toward;
+    WallSample farther;
+    if (look_up(back, farther) != LookUp::found || surface_->any_hit(x, back) ||
+        !(std::abs(farther.share - plane_.share(clear)) < 0.1 * plane_.share(clear))) {
+      return sample_directly(x, result);
+    }
+    const double slope = plane_.slope(distance), slope_back = plane_.slope(clear);
+    result.distance = distance;
+    result.share = std::max(farther.share + plane_.share(distance) - plane_.share(clear), 0.0);
+    result.gradient = farther.gradient + (slope - slope_back) * toward;
+    result.moment = farther.moment + (slope * distance - slope_back * clear) * toward * toward.transpose();
+    return result.share > 0;
+  }
+
   static constexpr double pi = 3.14159265358979323846;
   static constexpr std::size_t direction_count = 128;
   static constexpr int block_cells = 8;

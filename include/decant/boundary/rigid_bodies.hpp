@@ -93,6 +93,7 @@ class RigidBodies {
 
   /// Takes all bodies to [time, time + time_step] [s].
   void set_interval(double time, double time_step) noexcept {
+    duration_ = time_step;
     for (Body& body : bodies_) {
       body.before = body.motion.at(time);
       if (time_step > 0) {
@@ -114,8 +115,9 @@ class RigidBodies {
   }
 
   /// Largest speed of any particle relative to any body, at the body's point that is nearest to the particle within its
-  /// bounds, over the current interval; relative to the world if nothing moves or there is no body [m/s]. NaN if any
-  /// velocity is.
+  /// bounds, over the current interval; relative to the world if nothing moves or there is no body [m/s]. What has left
+  /// the scene, far from all bodies, does not count: else a spilled drop would shorten everybody's sub-steps for as
+  /// long as it falls. NaN if any velocity is.
   double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads,
                                 Reduction<double>& reduction) const noexcept {
     const bool all_move = !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), moves);
@@ -127,6 +129,9 @@ class RigidBodies {
           for (Index i = begin; i < end; ++i) {
             const Vector3<double> x = fluid.position.col(i).template cast<double>();
             const Vector3<double> v = fluid.velocity.col(i).template cast<double>();
+            if (v.squaredNorm() > largest * largest && has_left(x, v)) {
+              continue;
+            }
             if (!all_move) {
               take(v.norm());
             }
@@ -226,6 +231,15 @@ class RigidBodies {
     Vector3<double> normal = Vector3<double>::Zero();
     Vector3<double> point = Vector3<double>::Zero();
   };
+
+  /// Farther from every body than it travels in the interval, and by much more than walls are felt.
+  bool has_left(const Vector3<double>& x, const Vector3<double>& v) const noexcept {
+    const double least = 20 * reach_ + v.norm() * duration_;
+    return !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), [&](const Body& body) {
+      const double distance = least + body.reach;
+      return body.bounds.squaredExteriorDistance(body.from_world_before * x) > distance * distance;
+    });
+  }
 
   static bool moves(const Body& body) noexcept { return body.motion.samples().size() > 1; }
 
@@ -398,6 +412,7 @@ class RigidBodies {
   std::vector<Body> bodies_{};
   HalfSpace half_space_{};  ///< of the simulation's kernel
   double reach_ = 0;        ///< of walls [m]
+  double duration_ = 0;     ///< of the interval [s]
 };
 
 static_assert(Boundary<RigidBodies<float>, CubicSpline<float>>);

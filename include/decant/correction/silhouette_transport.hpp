@@ -20,12 +20,12 @@ namespace decant {
 
 /// Settings of SilhouetteTransport. Lengths are in pixels of the image.
 struct SilhouetteTransportSettings {
-  double cell_px = 4;         ///< pixels are taken together in squares of this side, >= 1
-  double blur_px = 4;         ///< square root of the entropy's weight, > 0: what is finer is not told apart
-  double reach_px = 40;       ///< moving mass farther costs more than to leave it unmatched, > blur_px
-  int most_cells = 1500;      ///< of either silhouette; cells grow where there would be more, >= 16
-  int iterations = 50;        ///< of the matching, >= 1
-  int debias_iterations = 25; ///< of the matching of the prediction with itself, >= 1
+  double cell_px = 4;          ///< pixels are taken together in squares of this side, >= 1
+  double blur_px = 4;          ///< square root of the entropy's weight, > 0: what is finer is not told apart
+  double reach_px = 40;        ///< moving mass farther costs more than to leave it unmatched, > blur_px
+  int most_cells = 1500;       ///< of either silhouette; cells grow where there would be more, >= 16
+  int iterations = 50;         ///< of the matching, >= 1
+  int debias_iterations = 25;  ///< of the matching of the prediction with itself, >= 1
 };
 
 /// Unbalanced, debiased optimal transport between two masks: the sum of squared distances that pixels travel is the
@@ -118,7 +118,8 @@ class SilhouetteTransport {
       }
     }
     for (cells.side = settings_.cell_px;; cells.side *= 1.25) {
-      const Index across = bottom < top ? 0 : static_cast<Index>(static_cast<double>(right - left + 1) / cells.side) + 1;
+      const Index across =
+          bottom < top ? 0 : static_cast<Index>(static_cast<double>(right - left + 1) / cells.side) + 1;
       const Index down = bottom < top ? 0 : static_cast<Index>(static_cast<double>(bottom - top + 1) / cells.side) + 1;
       sums_.assign(static_cast<std::size_t>(across * down), Eigen::Array3d::Zero());
       for (Index row = top; row <= bottom; ++row) {

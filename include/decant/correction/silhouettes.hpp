@@ -33,9 +33,9 @@ struct Silhouettes {
   using Camera = CameraType;
 
   std::span<const SilhouetteView<Camera>> views{};
-  int pass = 0;                               ///< 0 .. passes - 1: which of the corrector's passes this is
-  double spacing = 0;                         ///< of particles [m]
-  Vector3<double> gravity{0, 0, -9.81};       ///< [m/s^2]
+  int pass = 0;                          ///< 0 .. passes - 1: which of the corrector's passes this is
+  double spacing = 0;                    ///< of particles [m]
+  Vector3<double> gravity{0, 0, -9.81};  ///< [m/s^2]
   Threads threads{};
 };
 

@@ -17,8 +17,8 @@ namespace decant {
 
 /// One pass of TransportCorrector.
 struct TransportPass {
-  double cell_px = 4;         ///< see SilhouetteTransportSettings
-  double blur_px = 4;         ///< likewise
+  double cell_px = 4;           ///< see SilhouetteTransportSettings
+  double blur_px = 4;           ///< likewise
   double velocity_share = 0.8;  ///< how much of a move above the gate the velocity takes, 0 .. 1
 };
 
@@ -26,11 +26,11 @@ struct TransportPass {
 struct TransportCorrectorSettings {
   /// Coarse to fine: far moves first, edges last.
   std::vector<TransportPass> passes{{8, 10, 0.4}, {5, 7, 0.6}, {4, 4, 0.8}, {4, 4, 0.8}};
-  double dead_zone_px = 0;       ///< shorter moves are noise of the mask's edge, >= 0
-  double velocity_gate_px = 2;   ///< shorter moves leave velocities alone, >= 0
-  double longest_move = 0.008;   ///< per pass [m], > 0
-  double fastest = 4;            ///< corrected velocities stay below [m/s], > 0
-  int least_pixels = 150;        ///< of liquid that a mask must show to be trusted, >= 1
+  double dead_zone_px = 0;      ///< shorter moves are noise of the mask's edge, >= 0
+  double velocity_gate_px = 2;  ///< shorter moves leave velocities alone, >= 0
+  double longest_move = 0.008;  ///< per pass [m], > 0
+  double fastest = 4;           ///< corrected velocities stay below [m/s], > 0
+  int least_pixels = 150;       ///< of liquid that a mask must show to be trusted, >= 1
 };
 
 /// Transport of the predicted silhouette to the observed one (SilhouetteTransport), as a move of each particle that a
@@ -75,8 +75,7 @@ class TransportCorrector {
     bool any = false;
     for (const SilhouetteView<CameraType>& view : seen.views) {
       const Index pixels = (*view.observed >= 128).count();
-      if (pixels >= settings_.least_pixels &&
-          transports_[pass].match(*view.predicted, *view.observed, seen.threads)) {
+      if (pixels >= settings_.least_pixels && transports_[pass].match(*view.predicted, *view.observed, seen.threads)) {
         any = true;
         gather(fluid, view, transports_[pass], seen.threads);
       }
@@ -119,9 +118,9 @@ class TransportCorrector {
  private:
   /// Of the least-squares problem for one particle's move.
   struct Normal {
-    Matrix3<double> square = Matrix3<double>::Zero();    ///< sum of J' J
-    Vector3<double> wanted = Vector3<double>::Zero();    ///< sum of J' d
-    double displacement_px = 0;                          ///< the longest d
+    Matrix3<double> square = Matrix3<double>::Zero();  ///< sum of J' J
+    Vector3<double> wanted = Vector3<double>::Zero();  ///< sum of J' d
+    double displacement_px = 0;                        ///< the longest d
   };
 
   void gather(const FluidState<Scalar>& fluid, const SilhouetteView<CameraType>& view,

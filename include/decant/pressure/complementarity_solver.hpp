@@ -166,8 +166,8 @@ class ComplementaritySolver {
     }
     return sum_over(step, [&](std::size_t own) {
       const Scalar slope = squared_step * system.diagonal()[own];
-      // a particle that feels neither neighbours nor walls has no slope to divide by
-      const Scalar alone = slope > smallest_slope_ ? residual_[own] / slope : Scalar(0);
+      // what is not in contact may have no slope to divide by
+      const Scalar alone = contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
       image_[own] = contact_[own] * (in_bulk ? alone + cells_.correction(own) : alone);
       return static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
     });
@@ -198,8 +198,14 @@ class ComplementaritySolver {
                 offset[own] + squared_step * system.density_rate(step.neighbors, system.accelerations(), i, false);
             const Scalar slope = squared_step * system.diagonal()[own];
             residual_[own] = left;
-            partial.add(std::max(left, std::min(-left, term[own] * slope)));
-            contact_[own] = term[own] > 0 || left > 0 ? Scalar(1) : Scalar(0);
+            if (slope > smallest_slope_) {
+              partial.add(std::max(left, std::min(-left, term[own] * slope)));
+              contact_[own] = term[own] > 0 || left > 0 ? Scalar(1) : Scalar(0);
+            } else {
+              // Feels neither neighbours nor walls: no pressure changes what is left here, and the pressure it has is
+              // from a place where it had company. In contact, it would hold up the others for ever.
+              residual_[own] = term[own] = contact_[own] = 0;
+            }
             for (std::size_t axis = 0; axis < 4; ++axis) {
               sum_[4 * own + axis] = system.accelerations()[4 * own + axis];
             }
@@ -240,7 +246,7 @@ class ComplementaritySolver {
                                       : std::max(left, std::min(-left, term[own] * slope)));
             partial.negative = partial.negative || term[own] < 0;
             // particles out of contact stay out until the next start
-            partial.touched = partial.touched || (contact_[own] == 0 && left > 0);
+            partial.touched = partial.touched || (contact_[own] == 0 && left > 0 && slope > smallest_slope_);
           }
           return partial;
         },

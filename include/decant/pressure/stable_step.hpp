@@ -14,12 +14,13 @@ namespace decant {
 /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
 /// down) with the stiffness p / (rho d^2), and a sub-step integrates that explicitly, whatever solver finds the
 /// pressure. With Dfsph and ResidualViscosity acting after the pressure, columns of forty layers stand still at
-/// 0.4 d / sqrt(p / rho), and collapse into themselves at 0.5; without that viscosity, at 0.35. Taken for twice the mean
-/// pressure, which is the largest of a liquid at rest.
-/// Liquid that is too dense all the same, after an impact on a deep pool for one, needs steps in which particles move
-/// little against each other: at a third of the usual and below, even what has collapsed stands up again.
-/// @param mean_pressure over rest density, of what is under pressure [m^2/s^2]. @param density_tolerance that the solver
-/// keeps to in the mean [-], infinity for solvers that had better not slow down. @return [s], infinity without pressure.
+/// 0.4 d / sqrt(p / rho), and collapse into themselves at 0.5; without that viscosity, at 0.35. Taken for twice the
+/// mean pressure, which is the largest of a liquid at rest. Liquid that is too dense all the same, after an impact on a
+/// deep pool for one, needs steps in which particles move little against each other: at a third of the usual and below,
+/// even what has collapsed stands up again.
+/// @param mean_pressure over rest density, of what is under pressure [m^2/s^2]. @param density_tolerance that the
+/// solver keeps to in the mean [-], infinity for solvers that had better not slow down. @return [s], infinity without
+/// pressure.
 template <class Step>
 typename Step::Scalar largest_stable_step(const Step& step, double mean_pressure, double density_tolerance) noexcept {
   using Scalar = typename Step::Scalar;

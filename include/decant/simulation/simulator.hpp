@@ -254,7 +254,8 @@ class Simulator {
   /// Takes over places that a corrector gave the particles. Where a wall stands in the straight way from where they
   /// were, the move ends at the wall; a move of more than `longest_path` [m] counts as taken from one place to another,
   /// and only must not end inside a body. What then is too dense is pushed apart in `sweeps` sweeps of PositionBased,
-  /// 0 for none. Velocities stay as they are, time does not advance, particles may come into another order.
+  /// 0 for none. Velocities stay as they are, but for what goes into a wall that stopped a move; time does not advance,
+  /// particles may come into another order.
   /// @param before 3xN [m], where the particles were, in the order of fluid(). @return how many moves were cut short.
   Index adopt_moves(const ConstPointsView<Scalar>& before, double longest_path, int sweeps) noexcept {
     bodies_.set_interval(time_, 0);
@@ -282,7 +283,7 @@ class Simulator {
       }
     }
     bodies_.sample(before_, settings_.spacing, settings_.threads, walls_);
-    Index cut_short = keep_on_sides();
+    Index cut_short = keep_on_sides();  // this takes the speed into walls
     if (sweeps > 0 && fluid_.size() > 0) {
       find_neighbors();
       kept_velocity_ = fluid_.velocity;
@@ -294,6 +295,7 @@ class Simulator {
       fluid_.position += fluid_.velocity;
       fluid_.velocity = kept_velocity_;
       cut_short += keep_on_sides();
+      fluid_.velocity = kept_velocity_;
     }
     return cut_short;
   }
@@ -592,11 +594,9 @@ class Simulator {
     }
   }
 
-  /// The guard for moves that are not motion: from before_, at walls that stand, without a change of velocities.
+  /// The guard for moves that are not motion: from before_, at walls that stand.
   Index keep_on_sides() noexcept {
-    kept_velocity_ = fluid_.velocity;
     const GuardReport guard = bodies_.guard(before_, 0, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
-    fluid_.velocity = kept_velocity_;
     return guard.slid + guard.stopped + guard.lost;
   }
 

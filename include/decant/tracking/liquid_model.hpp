@@ -5,6 +5,7 @@
 
 #include <concepts>
 
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/concept.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/pose.hpp>

@@ -32,12 +32,12 @@ namespace decant {
 
 /// What a tracker needs to know beside its model and its corrector.
 struct TrackerSettings {
-  double sphere_in_spacings = 0.66;  ///< radius with which particles are drawn, over their spacing, > 0
-  int gap_closing_px = 4;            ///< gaps in the drawn silhouette up to this are closed, 0 .. 64
-  int cleaning_window_px = 3;        ///< of MaskCleaning; 1 takes masks as they come
-  int smallest_region_px = 10;       ///< likewise
-  double occlusion_margin = 1e-3;    ///< see RayOcclusion [m]
-  int relaxation_sweeps = 4;         ///< after each correction, what is too dense moves apart; >= 0
+  double sphere_in_spacings = 0.66;     ///< radius with which particles are drawn, over their spacing, > 0
+  int gap_closing_px = 4;               ///< gaps in the drawn silhouette up to this are closed, 0 .. 64
+  int cleaning_window_px = 3;           ///< of MaskCleaning; 1 takes masks as they come
+  int smallest_region_px = 10;          ///< likewise
+  double occlusion_margin = 1e-3;       ///< see RayOcclusion [m]
+  int relaxation_sweeps = 4;            ///< after each correction, what is too dense moves apart; >= 0
   double longest_path_in_spacings = 5;  ///< longer moves are mass taken from place to place, not paths; > 0
   double longest_gap = 1;               ///< between frames [s]; later ones are refused, > 0
   ImageLikelihoodSettings likelihood{};
@@ -57,8 +57,8 @@ struct CameraMask {
   ConstMaskView mask;
 };
 
-/// All that arrives with one frame. Bodies that are not named go on as they were told before; cameras that are not named
-/// saw nothing: the simulation runs on, uncorrected by them.
+/// All that arrives with one frame. Bodies that are not named go on as they were told before; cameras that are not
+/// named saw nothing: the simulation runs on, uncorrected by them.
 struct TrackerFrame {
   double time = 0;  ///< [s], on the model's clock
   std::span<const TrackedPose> poses{};
@@ -70,18 +70,25 @@ enum class FrameStatus {
   uncorrected,   ///< time went on, but there was no mask that could be used
   late,          ///< the frame is not newer than the one before: nothing was done
   gap,           ///< the frame is later than longest_gap, or its time is not finite: nothing was done
-  bad_input,     ///< a body or camera that does not exist, a pose that is none, or a mask of another size: nothing was done
+  bad_input,     ///< a body or camera that does not exist, a pose that is none, or a mask of another size: nothing was
+                 ///< done
   model_failed,  ///< the simulation could not take the step: nothing was done
 };
 
 constexpr std::string_view to_string(FrameStatus status) {
   switch (status) {
-    case FrameStatus::ok: return "ok";
-    case FrameStatus::uncorrected: return "uncorrected";
-    case FrameStatus::late: return "late";
-    case FrameStatus::gap: return "gap";
-    case FrameStatus::bad_input: return "bad_input";
-    case FrameStatus::model_failed: return "model_failed";
+    case FrameStatus::ok:
+      return "ok";
+    case FrameStatus::uncorrected:
+      return "uncorrected";
+    case FrameStatus::late:
+      return "late";
+    case FrameStatus::gap:
+      return "gap";
+    case FrameStatus::bad_input:
+      return "bad_input";
+    case FrameStatus::model_failed:
+      return "model_failed";
   }
   return "";
 }
@@ -89,10 +96,10 @@ constexpr std::string_view to_string(FrameStatus status) {
 /// How a frame went.
 struct FrameReport {
   FrameStatus status = FrameStatus::ok;
-  double time = 0;              ///< of the model, afterwards [s]
-  Overlap prior{};              ///< simulation against cleaned masks before the correction, all cameras together
-  Overlap posterior{};          ///< and after it
-  double log_likelihood = 0;    ///< of the masks, given the corrected state [nat]
+  double time = 0;            ///< of the model, afterwards [s]
+  Overlap prior{};            ///< simulation against cleaned masks before the correction, all cameras together
+  Overlap posterior{};        ///< and after it
+  double log_likelihood = 0;  ///< of the masks, given the corrected state [nat]
   CorrectionReport correction{};
   double relocated_volume = 0;  ///< mass that was taken from one place to another [m^3]
   double physics_ms = 0, drawing_ms = 0, correction_ms = 0, relaxation_ms = 0;  ///< wall time [ms]
@@ -100,8 +107,8 @@ struct FrameReport {
   bool advanced() const noexcept { return status == FrameStatus::ok || status == FrameStatus::uncorrected; }
 };
 
-/// A liquid model, cameras, and a corrector, stepped together. Not to be called from several threads at once; copies are
-/// independent, with meshes shared.
+/// A liquid model, cameras, and a corrector, stepped together. Not to be called from several threads at once; copies
+/// are independent, with meshes shared.
 template <class ModelType, class CorrectorType, class CameraType = DistortedPinholeCamera>
 class Tracker {
   static_assert(LiquidModel<ModelType>,
@@ -117,13 +124,16 @@ class Tracker {
   using Scalar = typename Model::Scalar;
   using Settings = TrackerSettings;
   using Observation = Silhouettes<Camera>;
+  using StepReportType = decltype(std::declval<Model&>().step(0.0));
 
   static_assert(std::is_same_v<typename CorrectorType::Observation, Observation>,
                 "Tracker: Corrector::Observation must be decant::Silhouettes<Camera>");
 
   /// The model as it starts: bodies added, liquid filled. Throws std::invalid_argument if a setting is out of range.
   explicit Tracker(Model model, CorrectorType corrector = {}, const Settings& settings = {})
-      : model_(std::move(model)), corrector_(std::move(corrector)), settings_(settings),
+      : model_(std::move(model)),
+        corrector_(std::move(corrector)),
+        settings_(settings),
         likelihood_(settings.likelihood) {
     expects(settings.sphere_in_spacings > 0 && settings.sphere_in_spacings < 100, "Tracker: sphere_in_spacings",
             "> 0 and < 100", settings.sphere_in_spacings);
@@ -171,7 +181,8 @@ class Tracker {
       for (const TrackedPose& pose : frame.poses) {
         model_.move_body(pose.body, pose.world_from_body, duration);
       }
-      if (!model_.step(duration).advanced()) {
+      step_report_ = model_.step(duration);
+      if (!step_report_.advanced()) {
         report.status = FrameStatus::model_failed;
         return report;
       }
@@ -196,6 +207,9 @@ class Tracker {
     started_ = false;
   }
 
+  /// What the model said of its last step.
+  const StepReportType& step_report() const noexcept { return step_report_; }
+
   Model& model() noexcept { return model_; }
   const Model& model() const noexcept { return model_; }
   CorrectorType& corrector() noexcept { return corrector_; }
@@ -206,8 +220,8 @@ class Tracker {
   const Mask& predicted(std::size_t camera) const { return eyes_.at(camera).predicted; }
   const Mask& observed(std::size_t camera) const { return eyes_.at(camera).observed; }
 
-  /// The silhouette of a model's liquid in one of the cameras, with the bodies where that model has them: for forecasts,
-  /// made by a copy of the model that runs ahead.
+  /// The silhouette of a model's liquid in one of the cameras, with the bodies where that model has them: for
+  /// forecasts, made by a copy of the model that runs ahead.
   void predict(const Model& model, std::size_t camera, Mask& mask) {
     expects(camera < eyes_.size(), "Tracker: camera", "one that was added", camera);
     Eye& eye = eyes_[camera];
@@ -385,6 +399,7 @@ class Tracker {
   std::vector<Eye> eyes_{};
   std::vector<SilhouetteView<Camera>> views_{};
   Growable<Scalar, 3> before_{};
+  StepReportType step_report_{};
   bool started_ = false;
 };
 
