@@ -46,10 +46,12 @@
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
+#include <decant/correction/map_filter.hpp>
 #include <decant/correction/open_loop.hpp>
 #include <decant/correction/silhouette_transport.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/correction/transport_corrector.hpp>
+#include <decant/correction/warp_field.hpp>
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/image_kernel.hpp>
 #include <decant/coverage/mask_cleaning.hpp>

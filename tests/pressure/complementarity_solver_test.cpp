@@ -13,6 +13,7 @@
 
 using decant::ComplementaritySolver;
 using decant::Index;
+using decant::PointArray;
 using decant::PressureSystem;
 using decant::Vector3;
 using decant_test::matrix_of;
@@ -134,4 +135,29 @@ TEST_CASE("ComplementaritySolver: says so when it is not given enough iterations
     CHECK(*std::min_element(term.begin(), term.end()) >= 0);
   }
   CHECK(last < 1e-3);
+}
+
+TEST_CASE("ComplementaritySolver: a particle that feels nothing holds nobody up") {
+  // one far from the others, with the pressure that it had among them
+  auto liquid = loose_ball<Kernel>(0.005, 4, 0.2, 0.1);
+  const Index alone = 17;
+  PointArray<double> places = liquid.fluid.position;
+  places(0, alone) += 1;
+  liquid.place(places);
+  const auto step = liquid.view();
+  PressureSystem<double> system;
+  system.assemble(step);
+  REQUIRE(system.diagonal()[alone] == 0);
+  const auto count = static_cast<std::size_t>(step.fluid.size());
+  for (const double room : {-680.0, 50.0}) {  // it may come nearer, or be too dense: no pressure changes that
+    std::vector<double> offset(count, 3.0), term(count, 1e-3);
+    offset[alone] = room;
+    ComplementaritySolver<double> solver;
+    solver.begin_step();
+    const auto report = solver.solve(step, system, offset, term);
+    INFO("room " << room << ", " << report.iterations << " iterations");
+    CHECK(report.converged);
+    CHECK(report.iterations < 60);
+    CHECK(term[alone] == 0);
+  }
 }

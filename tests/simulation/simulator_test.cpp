@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -276,4 +277,65 @@ TEST_CASE("simulator: a periodic channel keeps its liquid and its mass") {
   CHECK((fluid.position.row(2).array() > 0).all());
   // a free floor: all of it speeds up alike
   CHECK(fluid.velocity.row(0).mean() == Approx(2 * 0.2).epsilon(0.01));
+}
+
+TEST_CASE("simulator: moves that a corrector made end at walls, and crowded liquid moves apart without speed") {
+  const double d = 0.005;
+  LiquidSimulator simulator(with_spacing(d));
+  simulator.add_body("plate", Box{{0, -0.1, -0.1}, {0.002, 0.1, 0.1}});
+  PointArray<float> x(3, 4), v = PointArray<float>::Zero(3, 4);
+  x.col(0) << -0.01f, 0, 0;
+  x.col(1) << -0.01f, 0.03f, 0;
+  x.col(2) << -0.03f, 0, 0.05f;
+  x.col(3) << -0.01f, -0.05f, 0;
+  v.col(0) << 1, 2, 0;
+  v.col(2) << 0, 3, 0;
+  simulator.add_particles(x, v, 0);
+  REQUIRE(simulator.step(1e-6).advanced());
+  auto& fluid = simulator.fluid();
+  const auto find = [&](std::uint32_t id) {
+    return static_cast<Index>(std::find(fluid.id.data(), fluid.id.data() + fluid.size(), id) - fluid.id.data());
+  };
+  const PointArray<float> before = fluid.position;
+  fluid.position(0, find(0)) = 0.01f;                            // through the plate
+  fluid.position.col(find(1)) << 0.05f, 0.03f, 0;                // to the other side of it, by far
+  fluid.position.col(find(2)) += Eigen::Vector3f(0.003f, 0, 0);  // free
+  fluid.position.col(find(3)) << 0.001f, -0.09f, 0;              // far, but into the plate
+  const double time = simulator.time();
+  CHECK(simulator.adopt_moves(before, 5 * d, 0) >= 1);
+  CHECK(simulator.time() == time);
+  CHECK(fluid.position(0, find(0)) < 0);
+  CHECK(fluid.position(0, find(0)) > -0.002f);                  // at the wall
+  CHECK(fluid.velocity(0, find(0)) == Approx(0).margin(1e-3));  // which took the speed toward it
+  CHECK(fluid.velocity(1, find(0)) == Approx(2));
+  CHECK(fluid.position(0, find(1)) == Approx(0.05));
+  CHECK(fluid.position(0, find(2)) == Approx(-0.027));
+  CHECK(fluid.velocity(1, find(2)) == Approx(3));
+  CHECK((fluid.position(0, find(3)) < 0 || fluid.position(0, find(3)) > 0.002f));  // out of the material
+
+  // half of a block pushed into the other half
+  LiquidSimulator crowd(with_spacing(d));
+  const auto places = block<float>(8, 8, 8, d);
+  crowd.add_particles(places, PointArray<float>::Constant(3, places.cols(), 0.5f), 0);
+  REQUIRE(crowd.step(1e-6).advanced());
+  const PointArray<float> start = crowd.fluid().position;
+  for (Index i = 0; i < crowd.fluid().size(); ++i) {
+    float& place = crowd.fluid().position(0, i);
+    place = place > 0.02f ? 0.02f + 0.8f * (place - 0.02f) : place;
+  }
+  LiquidSimulator left_alone = crowd;
+  REQUIRE(left_alone.step(1e-9).advanced());
+  std::map<std::uint32_t, Vector3<float>> velocity;
+  for (Index i = 0; i < crowd.fluid().size(); ++i) {
+    velocity[crowd.fluid().id[i]] = crowd.fluid().velocity.col(i);
+  }
+  crowd.adopt_moves(start, 5 * d, 8);
+  for (Index i = 0; i < crowd.fluid().size(); ++i) {
+    REQUIRE(crowd.fluid().velocity.col(i) == velocity.at(crowd.fluid().id[i]));
+  }
+  REQUIRE(crowd.step(1e-9).advanced());
+  const float relaxed = crowd.fluid().density.maxCoeff();
+  INFO("density " << left_alone.fluid().density.maxCoeff() << " and relaxed " << relaxed);
+  CHECK(left_alone.fluid().density.maxCoeff() > 1.1f * 998);
+  CHECK(relaxed < 1.05f * 998);
 }

@@ -112,6 +112,17 @@ class RayOcclusion {
     return false;
   }
 
+  /// Whether a body's surface stands between two points of the world.
+  bool blocked(const Vector3<double>& from, const Vector3<double>& to) const noexcept {
+    const Vector3<double> a = camera_.to_camera(from), b = camera_.to_camera(to);
+    for (const Body& body : bodies_) {
+      if (body.surface->any_hit(body.body_from_camera * a, body.body_from_camera * b)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
   /// Depth of the first surface that a pixel's sight line meets [m], nothing if it meets none.
   std::optional<double> first_wall(const Eigen::Vector2d& pixel) const noexcept {
     const Vector3<double> begin = camera_.camera().unproject(pixel, 0);

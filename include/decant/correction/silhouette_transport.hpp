@@ -199,12 +199,26 @@ class SilhouetteTransport {
     from_.log_scale = u_.log();
   }
 
-  /// Mean place of what a point at p is matched with: the softmax of -|p - y|^2 / entropy + log scale.
-  Eigen::Vector2d target(const Cells& cells, const Eigen::Vector2d& p, Eigen::ArrayXd& exponent) const noexcept {
+  /// What a point at p is matched with: the softmax of -|p - y|^2 / entropy + log scale.
+  struct Match {
+    Eigen::Vector2d place;  ///< mean [px]
+    double log_total;       ///< logarithm of what the softmax is over
+  };
+  Match match_of(const Cells& cells, const Eigen::Vector2d& p, Eigen::ArrayXd& exponent) const noexcept {
     exponent = cells.log_scale - ((cells.x - p.x()).square() + (cells.y - p.y()).square()) / entropy();
-    exponent = (exponent - exponent.maxCoeff()).exp();
+    const double largest = exponent.maxCoeff();
+    exponent = (exponent - largest).exp();
     const double total = exponent.sum();
-    return {(exponent * cells.x).sum() / total, (exponent * cells.y).sum() / total};
+    return {{(exponent * cells.x).sum() / total, (exponent * cells.y).sum() / total}, largest + std::log(total)};
+  }
+
+  /// How far what is at p has to go. Of a point whose match is at distance D, exp(-(D / reach)^2) is matched at all:
+  /// what is so far that less than 1 / e would be, is left where it is by and by.
+  Eigen::Vector2d displacement_at(const Eigen::Vector2d& p, Eigen::ArrayXd& exponent) const noexcept {
+    const Match target = match_of(to_, p, exponent), self = match_of(from_, p, exponent);
+    const double full_cell = from_.side * from_.side;
+    const double log_matched = (1 - stiffness()) * (target.log_total - std::log(full_cell));
+    return std::min(1.0, std::exp(1 + log_matched)) * (target.place - self.place);
   }
 
   /// The displacement on a grid around the prediction, to be interpolated.
@@ -230,7 +244,7 @@ class SilhouetteTransport {
           Node& node = nodes_[static_cast<std::size_t>(row * nodes_x_ + column)];
           if (node.valid) {
             const Eigen::Vector2d p = origin_ + node_spacing_ * Eigen::Vector2d(column, static_cast<double>(row));
-            node.displacement = target(to_, p, exponent) - target(from_, p, exponent);
+            node.displacement = displacement_at(p, exponent);
           }
         }
       }

@@ -261,25 +261,22 @@ class Simulator {
     bodies_.set_interval(time_, 0);
     before_ = before;
     const auto farthest = static_cast<Scalar>(longest_path * longest_path);
-    bool taken_elsewhere = false;
+    taken_.clear();
     for (Index i = 0; i < fluid_.size(); ++i) {
       if (!fluid_.position.col(i).allFinite()) {
         fluid_.position.col(i) = before_.col(i);
       } else if ((fluid_.position.col(i) - before_.col(i)).squaredNorm() > farthest) {
-        before_.col(i) = fluid_.position.col(i);
-        taken_elsewhere = true;
+        taken_.push_back(static_cast<std::uint32_t>(i));
       }
     }
-    if (taken_elsewhere) {
+    if (!taken_.empty()) {
       kept_velocity_ = fluid_.velocity;
       for (BodyId body = 0; body < bodies_.size(); ++body) {
         bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
       }
       fluid_.velocity = kept_velocity_;
-      for (Index i = 0; i < fluid_.size(); ++i) {
-        if ((fluid_.position.col(i) - before_.col(i)).squaredNorm() > farthest) {
-          before_.col(i) = fluid_.position.col(i);
-        }
+      for (const std::uint32_t i : taken_) {
+        before_.col(i) = fluid_.position.col(i);  // no path to look after
       }
     }
     bodies_.sample(before_, settings_.spacing, settings_.threads, walls_);
@@ -712,6 +709,7 @@ class Simulator {
   Growable<Scalar, 3> before_{};
   Growable<Scalar, 3> kept_velocity_{};
   PositionBased<Scalar> apart_{};
+  std::vector<std::uint32_t> taken_{};  ///< particles that a corrector took from one place to another
   Growable<Scalar, 3> shift_{};
   Growable<Scalar, 3> scratch_points_{};
   Growable<Scalar, 1> scratch_scalars_{};

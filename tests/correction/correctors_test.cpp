@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: MIT
+// Correctors on a block of liquid whose silhouette was seen somewhere else.
+
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include <decant/boundary/shapes.hpp>
+#include <decant/correction/map_filter.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/correction/transport_corrector.hpp>
+#include <decant/correction/warp_field.hpp>
+
+#include "catch.hpp"
+#include "correction/seen.hpp"
+
+using decant::Index;
+using decant::Vector3;
+using decant_test::Eye;
+using decant_test::liquid_block;
+
+namespace {
+
+template <class Scalar>
+Vector3<double> middle(const decant::FluidState<Scalar>& fluid) {
+  return fluid.position.rowwise().mean().template cast<double>();
+}
+
+/// All passes of a corrector over one frame.
+template <class CorrectorType, class Scalar, std::size_t Count>
+decant::CorrectionReport correct(CorrectorType& corrector, decant::FluidState<Scalar>& fluid,
+                                 std::array<Eye<Scalar>*, Count> eyes, decant::Threads threads = {1}) {
+  int passes = 1;
+  if constexpr (requires { corrector.passes(); }) {
+    passes = corrector.passes();
+  }
+  decant::CorrectionReport all;
+  for (int pass = 0; pass < passes; ++pass) {
+    std::vector<decant::SilhouetteView<decant::DistortedPinholeCamera>> views;
+    for (Eye<Scalar>* eye : eyes) {
+      views.push_back(eye->predict(fluid));
+    }
+    const auto report = corrector.correct(
+        fluid, {views, pass, decant_test::block_spacing, Vector3<double>(0, 0, -9.81), threads}, Scalar(1.0 / 30));
+    all.moved += report.moved;
+    all.mean_shift += report.mean_shift;
+  }
+  return all;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("transport corrector: one camera moves the liquid across its sight, and never in depth", "", float,
+                   double) {
+  const Vector3<double> there(0.012, 0.02, -0.008);  // of which the camera sees the first and the last
+  auto fluid = liquid_block<TestType>({0, 0, 0});
+  Eye<TestType> eye(decant_test::before_the_block());
+  eye.observe(liquid_block<TestType>(there));
+  decant::TransportCorrector<TestType> corrector;
+  for (int frame = 0; frame < 4; ++frame) {
+    correct(corrector, fluid, std::array{&eye});
+  }
+  const Vector3<double> now = middle(fluid);
+  INFO("middle [mm] " << 1e3 * now.transpose());
+  // a pixel is 1 mm here; the block is seen 4 % smaller from where it was seen, which moves no middle
+  CHECK(now.x() == Approx(there.x()).margin(0.0015));
+  CHECK(now.z() == Approx(there.z()).margin(0.0015));
+  CHECK(std::abs(now.y()) < 0.0015);
+  CHECK(fluid.velocity.row(0).mean() > 0);  // it was taken to be late
+}
+
+TEST_CASE("transport corrector: two cameras find the place in space") {
+  const Vector3<double> there(0.010, -0.012, 0.006);
+  auto fluid = liquid_block<float>({0, 0, 0});
+  Eye<float> before(decant_test::before_the_block()), beside(decant_test::beside_the_block());
+  before.observe(liquid_block<float>(there));
+  beside.observe(liquid_block<float>(there));
+  decant::TransportCorrector<> corrector;
+  for (int frame = 0; frame < 4; ++frame) {
+    correct(corrector, fluid, std::array{&before, &beside});
+  }
+  INFO("middle [mm] " << 1e3 * middle(fluid).transpose());
+  CHECK((middle(fluid) - there).norm() < 0.0025);
+}
+
+TEST_CASE("transport corrector: a right prediction stays as it is") {
+  auto fluid = liquid_block<double>({0.003, 0.01, -0.002});
+  const auto start = fluid;
+  Eye<double> eye(decant_test::before_the_block());
+  eye.observe(fluid);
+  decant::TransportCorrector<double> corrector;
+  correct(corrector, fluid, std::array{&eye});
+  CHECK((fluid.position - start.position).colwise().norm().maxCoeff() < 1e-4);  // a tenth of a pixel
+  CHECK(fluid.velocity == start.velocity);                                      // below the gate
+}
+
+TEST_CASE("transport corrector: what is hidden stays, and so does all where little was seen") {
+  auto fluid = liquid_block<float>({0, 0, 0});
+  const auto start = fluid;
+  Eye<float> eye(decant_test::before_the_block());
+  eye.observe(liquid_block<float>({0.01, 0, 0}));
+  // a plate before the left half
+  eye.sight.add(
+      std::make_shared<const decant::BoundingVolumeHierarchy>(decant::Box{{-0.1, -0.11, -0.1}, {0, -0.1, 0.1}}.mesh()));
+  decant::TransportCorrector<> corrector;
+  correct(corrector, fluid, std::array{&eye});
+  double left = 0, right = 0;
+  for (Index i = 0; i < fluid.size(); ++i) {
+    const double moved = static_cast<double>((fluid.position.col(i) - start.position.col(i)).norm());
+    (start.position(0, i) < 0 ? left : right) += moved;
+  }
+  CHECK(left == 0);
+  CHECK(right > 0.1);  // 256 particles by some millimetres
+
+  eye.observed.setZero();
+  eye.observed.block(50, 50, 12, 12).setConstant(decant::mask_liquid);  // 144 pixels: too few to be trusted
+  auto again = start;
+  CHECK(correct(corrector, again, std::array{&eye}).moved == 0);
+  CHECK(again.position == start.position);
+}
+
+TEST_CASE("correctors: the same bits for any number of threads") {
+  const auto require_same = [](auto make) {
+    Eye<float> eye(decant_test::before_the_block());
+    eye.observe(liquid_block<float>({0.01, 0, 0.004}));
+    decant::FluidState<float> first;
+    for (int threads : {1, 2, 4}) {
+      auto fluid = liquid_block<float>({0, 0, 0});
+      auto corrector = make();
+      correct(corrector, fluid, std::array{&eye}, {threads});
+      if (threads == 1) {
+        first = fluid;
+      }
+      REQUIRE(fluid.position == first.position);
+      REQUIRE(fluid.velocity == first.velocity);
+    }
+    const auto untouched = liquid_block<float>({0, 0, 0});
+    REQUIRE((first.position != untouched.position || first.velocity != untouched.velocity));
+  };
+  require_same([] { return decant::TransportCorrector<>(); });
+  require_same([] { return decant::MapFilterSchenck2017<>(); });
+  require_same([] { return decant::WarpFieldSchenck2017<>(); });
+}
+
+TEST_CASE("MAP filter: the best of 27 places by the activation, and a velocity that follows") {
+  auto fluid = liquid_block<double>({0, 0, 0});
+  fluid.resize(1);
+  fluid.position.col(0) << 0, 0, 0;
+  Eye<double> eye(decant_test::before_the_block());
+  eye.observed.block(70, 130, 10, 10).setConstant(decant::mask_liquid);  // right of the particle, a little above it
+  decant::MapFilterSchenck2017<double> filter;
+  const auto views = std::array{eye.predict(fluid)};
+  const auto report = filter.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  CHECK(report.moved == 1);
+  // by hand: of all places the one whose pixel is nearest to the patch, so right, up, and nearer to the camera, where a
+  // step of 5 mm takes more pixels
+  CHECK(fluid.position.col(0).isApprox(Vector3<double>(0.005, -0.005, 0.005)));
+  CHECK(fluid.velocity.col(0).isApprox(30 * Vector3<double>(0.005, -0.005, 0.005)));
+
+  // a wall right of the particle: paths that cross it are struck out
+  fluid.position.col(0) << 0, 0, 0;
+  fluid.velocity.setZero();
+  eye.sight.add(std::make_shared<const decant::BoundingVolumeHierarchy>(
+      decant::Box{{0.002, -0.02, -0.1}, {0.003, 0.1, 0.1}}.mesh()));
+  const auto walled = std::array{eye.predict(fluid)};
+  filter.correct(fluid, {walled, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  CHECK(fluid.position(0, 0) <= 0);
+  CHECK(fluid.position(2, 0) == Approx(0.005));
+
+  // nothing seen, nothing better: the prediction stays
+  fluid.position.col(0) << 0, 0, 0;
+  eye.observed.setZero();
+  const auto blind = std::array{eye.predict(fluid)};
+  CHECK(filter.correct(fluid, {blind, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30).moved == 0);
+}
+
+TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is felt by hidden neighbours") {
+  auto fluid = liquid_block<double>({0, 0, 0});
+  fluid.resize(2);
+  fluid.position.col(0) << 0, 0, 0;
+  fluid.position.col(1) << 0, 0.004, 0;
+  Eye<double> eye(decant_test::before_the_block());
+  eye.observed(79, 130) = decant::mask_liquid;  // 30.5 px right and half a pixel up of where the origin is seen
+  decant::WarpFieldSettings settings;
+  settings.strength = 2;
+  decant::WarpFieldSchenck2017<double> field(settings);
+  auto view = eye.predict(fluid);
+  eye.hidden[1] = 1;
+  view.hidden = eye.hidden;
+  eye.drawing.render(fluid.position, eye.hidden, eye.sight.camera().camera(), eye.sight.camera().camera_from_world(),
+                     eye.predicted);
+  const auto views = std::array{view};
+  field.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 0.5);
+  // the sum by hand: one pixel, u = (30.5, -0.5) px, not covered; a pixel is a millimetre
+  const double u = 30.5, v = -0.5, weight = std::exp(-(u * u + v * v) / (33 * 33));
+  const double h = 2 * 0.005 / decant::CubicSpline<double>::support_factor, volume = std::pow(0.005, 3);
+  const Vector3<double> pull = 2 * weight * 1e-3 * Vector3<double>(u, 0, -v);
+  const Vector3<double> own = 0.5 * volume * decant::CubicSpline<double>::value(0.0, h) * pull;
+  const Vector3<double> felt = 0.5 * volume * decant::CubicSpline<double>::value(0.004, h) * pull;
+  CHECK((fluid.velocity.col(0) - own).norm() < 2e-3 * own.norm());  // the look-up's own error is 1e-3 at most
+  CHECK((fluid.velocity.col(1) - felt).norm() < 2e-3 * felt.norm());
+}
+
+TEST_CASE("correctors: settings are checked") {
+  decant::TransportCorrectorSettings transport;
+  transport.passes.clear();
+  CHECK_THROWS_WITH(decant::TransportCorrector<>(transport), decant_test::contains("passes must be at least one"));
+  transport = {};
+  transport.longest_move = std::nan("");
+  CHECK_THROWS_WITH(decant::TransportCorrector<>(transport), decant_test::contains("longest_move [m] must be > 0"));
+  CHECK_THROWS_WITH(decant::MapFilterSchenck2017<>({.cell = 0}), decant_test::contains("cell [m] must be > 0"));
+  CHECK_THROWS_WITH(decant::WarpFieldSchenck2017<>({.strength = -1}),
+                    decant_test::contains("strength [1/s^2] must be"));
+}

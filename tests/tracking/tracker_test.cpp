@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// The tracker: what it does with frames, good and bad; that it leaves an uncorrected model alone; and that it closes
+// the loop, with decant's simulator and with somebody else's.
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <decant/boundary/shapes.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/correction/transport_corrector.hpp>
+#include <decant/simulation/simulator.hpp>
+#include <decant/tracking/tracker.hpp>
+
+#include "catch.hpp"
+#include "correction/seen.hpp"
+
+using namespace decant;
+
+namespace {
+
+/// Somebody else's simulation: particles that fall, and one body that is not in their way.
+struct FallingDust {
+  using Scalar = double;
+  struct Body {
+    std::shared_ptr<const BoundingVolumeHierarchy> surface;
+    PoseTrack motion;
+  };
+  struct Report {
+    bool went_well = true;
+    bool advanced() const { return went_well; }
+  };
+
+  FluidState<double> dust = decant_test::liquid_block<double>({0, 0, 0});
+  std::vector<Body> scene{
+      {std::make_shared<const BoundingVolumeHierarchy>(Box{{-0.05, -0.05, -0.2}, {0.05, 0.05, -0.19}}.mesh()),
+       PoseTrack()}};
+  double now = 0;
+  double gravity = -1;  // [m/s^2]
+  bool broken = false;
+
+  FluidState<double>& fluid() { return dust; }
+  double time() const { return now; }
+  double spacing() const { return decant_test::block_spacing; }
+  const std::vector<Body>& bodies() const { return scene; }
+  void move_body(BodyId body, const Pose& pose, double duration) {
+    scene[body].motion = PoseTrack({{now, scene[body].motion.at(now)}, {now + duration, pose}});
+  }
+  Report step(double duration) {
+    if (broken) {
+      return {false};
+    }
+    now += duration;
+    dust.velocity.row(2).array() += gravity * duration;
+    dust.position += duration * dust.velocity;
+    return {};
+  }
+};
+static_assert(LiquidModel<FallingDust>);
+static_assert(LiquidModel<LiquidSimulator>);
+
+using Camera = DistortedPinholeCamera;
+
+/// What a camera before the block sees of a liquid, raw.
+template <class Scalar>
+Mask seen(const FluidState<Scalar>& fluid) {
+  decant_test::Eye<Scalar> eye(decant_test::before_the_block());
+  eye.observe(fluid);
+  return eye.observed;
+}
+
+}  // namespace
+
+TEST_CASE("tracker: frames that are late, far ahead, or wrong are answered by a status and change nothing") {
+  Tracker<FallingDust, OpenLoop<double>> tracker(FallingDust{});
+  tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  const Mask mask = seen(tracker.model().dust);
+  const std::vector<CameraMask> masks{{0, mask}};
+  CHECK(tracker.track({0, {}, masks}).status == FrameStatus::ok);
+  CHECK(tracker.track({0.1, {}, masks}).status == FrameStatus::ok);
+  const auto require_refused = [&](const TrackerFrame& frame, FrameStatus status) {
+    const auto before = tracker.model().dust;
+    const FrameReport report = tracker.track(frame);
+    INFO(to_string(report.status));
+    REQUIRE(report.status == status);
+    REQUIRE_FALSE(report.advanced());
+    REQUIRE(report.time == tracker.model().now);
+    REQUIRE(tracker.model().now == 0.1);
+    REQUIRE(tracker.model().dust.position == before.position);
+  };
+  require_refused({0.05, {}, masks}, FrameStatus::late);
+  require_refused({0.1, {}, masks}, FrameStatus::late);
+  require_refused({2, {}, masks}, FrameStatus::gap);
+  require_refused({std::numeric_limits<double>::quiet_NaN(), {}, masks}, FrameStatus::gap);
+  const Mask other = Mask::Zero(10, 10);
+  const std::vector<CameraMask> wrong_size{{0, other}}, no_camera{{3, mask}};
+  require_refused({0.2, {}, wrong_size}, FrameStatus::bad_input);
+  require_refused({0.2, {}, no_camera}, FrameStatus::bad_input);
+  Pose lost;
+  lost.translation.x() = std::numeric_limits<double>::infinity();
+  const std::vector<TrackedPose> no_pose{{0, lost}}, no_body{{7, Pose{}}};
+  require_refused({0.2, no_pose, masks}, FrameStatus::bad_input);
+  require_refused({0.2, no_body, masks}, FrameStatus::bad_input);
+  tracker.model().broken = true;
+  require_refused({0.2, {}, masks}, FrameStatus::model_failed);
+  tracker.model().broken = false;
+  // a dropped frame: time goes on
+  const FrameReport dropped = tracker.track({0.2, {}, {}});
+  CHECK(dropped.status == FrameStatus::uncorrected);
+  CHECK(dropped.advanced());
+  CHECK(std::isnan(dropped.prior.iou()));
+  CHECK(tracker.model().now == Approx(0.2));
+}
+
+TEST_CASE("tracker: takes bodies to their poses and sees what they hide") {
+  Tracker<FallingDust, OpenLoop<double>> tracker(FallingDust{});
+  tracker.model().gravity = 0;
+  tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  const Mask mask = seen(tracker.model().dust);
+  const std::vector<CameraMask> masks{{0, mask}};
+  CHECK(tracker.track({0, {}, masks}).prior.iou() > 0.95);  // cleaning takes corners off
+  // the plate, turned up, between the camera and all of the block
+  const Pose before_it{Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * 3.14159265358979, Eigen::Vector3d::UnitX())),
+                       {0, -0.3, 0}};
+  const std::vector<TrackedPose> poses{{0, before_it}};
+  const FrameReport report = tracker.track({0.1, poses, masks});
+  CHECK(report.status == FrameStatus::ok);
+  CHECK(report.prior.predicted_px == 0);
+  CHECK(report.prior.observed_px > 1000);
+}
+
+TEST_CASE("tracker: without correction the model runs as it does alone, bit for bit") {
+  SimulatorSettings settings;
+  settings.spacing = decant_test::block_spacing;
+  settings.threads = {1};
+  LiquidSimulator alone(settings);
+  const auto drop = decant_test::liquid_block<float>({0, 0, 0});
+  alone.add_body("table", Box{{-0.1, -0.1, -0.05}, {0.1, 0.1, -0.03}});
+  alone.add_particles(drop.position, drop.velocity, 0);
+  Tracker<LiquidSimulator, OpenLoop<>> tracker(alone);
+  tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  const Mask mask = seen(drop);
+  const std::vector<CameraMask> masks{{0, mask}};
+  for (int frame = 1; frame <= 4; ++frame) {
+    REQUIRE(alone.step(frame / 30.0 - alone.time()).advanced());
+    REQUIRE(tracker.track({frame / 30.0, {}, masks}).advanced());
+    REQUIRE(tracker.model().fluid().position == alone.fluid().position);
+  }
+}
+
+TEST_CASE("tracker: a drop that really falls more slowly is followed, and its speed found") {
+  // reality falls with 4 m/s^2, the model with 9.81: after 0.2 s they are 12 cm apart
+  const double end = 0.2, real = 4;
+  const auto follow = [&](auto corrector, Threads threads) {
+    SimulatorSettings settings;
+    settings.spacing = decant_test::block_spacing;
+    settings.threads = {1};
+    LiquidSimulator model(settings);
+    const auto drop = decant_test::liquid_block<float>({0, 0, 0.05});
+    model.add_particles(drop.position, drop.velocity, 0);
+    TrackerSettings tracking;
+    tracking.threads = threads;
+    Tracker<LiquidSimulator, decltype(corrector)> tracker(model, corrector, tracking);
+    tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+    FrameReport report;
+    for (int frame = 1; frame <= 6; ++frame) {
+      const double t = frame * end / 6;
+      const Mask mask = seen(decant_test::liquid_block<float>({0, 0, 0.05 - 0.5 * real * t * t}));
+      const std::vector<CameraMask> masks{{0, mask}};
+      report = tracker.track({t, {}, masks});
+      REQUIRE(report.status == FrameStatus::ok);
+    }
+    return std::pair{report, tracker.model()};
+  };
+  const auto [open, alone] = follow(OpenLoop<>(), {1});
+  const auto [closed, corrected] = follow(TransportCorrector<>(), {1});
+  INFO("open loop " << open.posterior.iou() << ", prior " << closed.prior.iou() << ", closed "
+                    << closed.posterior.iou());
+  CHECK(open.posterior.iou() < 0.05);
+  CHECK(closed.posterior.iou() > 0.85);
+  CHECK(closed.prior.iou() > open.prior.iou() + 0.3);
+  CHECK(closed.log_likelihood > open.log_likelihood);
+  CHECK(closed.correction.moved > 100);
+  CHECK(closed.relocated_volume == 0);
+  const double height = static_cast<double>(corrected.fluid().position.row(2).mean());
+  CHECK(height == Approx(0.05 - 0.5 * real * end * end).margin(0.006));
+  CHECK(corrected.fluid().size() == alone.fluid().size());
+
+  const auto [again, with_four] = follow(TransportCorrector<>(), {4});
+  CHECK(again.posterior.both_px == closed.posterior.both_px);
+  CHECK(with_four.fluid().position == corrected.fluid().position);
+}
+
+TEST_CASE("tracker: stops a foreign model's particles at walls") {
+  FallingDust dust;
+  dust.gravity = 0;
+  dust.scene[0].surface =
+      std::make_shared<const BoundingVolumeHierarchy>(Box{{0.021, -0.1, -0.1}, {0.022, 0.1, 0.1}}.mesh());
+  Tracker<FallingDust, TransportCorrector<double>> tracker(dust);
+  tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  const Mask mask = seen(decant_test::liquid_block<double>({0.015, 0, 0}));
+  const std::vector<CameraMask> masks{{0, mask}};
+  for (int frame = 1; frame <= 3; ++frame) {
+    REQUIRE(tracker.track({frame / 30.0, {}, masks}).advanced());
+    tracker.model().dust.velocity.setZero();
+  }
+  CHECK(tracker.model().dust.position.row(0).mean() > 0.002);
+  CHECK(tracker.model().dust.position.row(0).maxCoeff() < 0.021);
+}
+
+TEST_CASE("tracker: settings are checked") {
+  TrackerSettings settings;
+  settings.sphere_in_spacings = std::nan("");
+  using Plain = Tracker<FallingDust, OpenLoop<double>>;
+  CHECK_THROWS_WITH(Plain(FallingDust{}, {}, settings), decant_test::contains("sphere_in_spacings must be > 0"));
+  settings = {};
+  settings.longest_gap = 0;
+  CHECK_THROWS_WITH(Plain(FallingDust{}, {}, settings), decant_test::contains("longest_gap [s] must be > 0"));
+  Plain tracker{FallingDust{}};
+  CHECK_THROWS_WITH(tracker.set_camera_pose(0, {}), decant_test::contains("camera must be one that was added"));
+}
