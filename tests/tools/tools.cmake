@@ -104,6 +104,36 @@ elseif(CASE STREQUAL "replay_motion_refuses_a_missing_file")
   run(2 --poses missing.csv --heights missing.csv --radius-mm 49 --depth-mm 78 --json out.json)
   expect_one_line("${errors}" "missing.csv")
 
+elseif(CASE STREQUAL "track_scores_a_recording")
+  # coarse, 90 % full and short: that both tools work together; how well it tracks is for the benchmark
+  execute_process(COMMAND "${RECORD}" --container cup --fill 0.9 --seed 3 --spacing-mm 7 --seconds 1.6 --out pour
+                  WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "record_pour failed: ${output}\n${errors}")
+  endif()
+  run(0 pour --corrector open_loop,map_filter,warp_field,default --spacing-mm 8 --json out.json)
+  foreach(name IN ITEMS open_loop map_filter warp_field default)
+    expect_keys("${SCRATCH}/out.json" correctors.${name}.iou_mean correctors.${name}.iou_pooled
+                correctors.${name}.prior_iou correctors.${name}.forecast_iou correctors.${name}.log_likelihood
+                correctors.${name}.volume_ml.cup correctors.${name}.volume_ml.pan
+                correctors.${name}.frames_per_second correctors.${name}.status)
+  endforeach()
+  file(READ "${SCRATCH}/out.json" json)
+  string(JSON frames LENGTH "${json}" correctors default iou)
+  string(JSON open GET "${json}" correctors open_loop iou_mean)
+  string(JSON closed GET "${json}" correctors default iou_mean)
+  if(NOT frames EQUAL 48 OR NOT closed GREATER open)
+    message(FATAL_ERROR "${frames} frames; open loop ${open}, default ${closed}")
+  endif()
+
+elseif(CASE STREQUAL "track_refuses_a_bad_recording")
+  run(2 missing --json out.json)
+  expect_one_line("${errors}" "missing")
+  file(MAKE_DIRECTORY "${SCRATCH}/bad")
+  file(WRITE "${SCRATCH}/bad/recording.json" "{\"format\": \"decant-recording\", \"version\": 7}")
+  run(2 bad --json out.json)
+  expect_one_line("${errors}" "version")
+
 else()
   message(FATAL_ERROR "no case '${CASE}'")
 endif()

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+// Tracks the liquid of a recording and scores how well:
+//   track RECORDING_DIR --corrector open_loop,default --json OUT.json
+// Exit status 0: done; 1: a method failed on the way; 2: the recording, a file or an argument is wrong.
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <decant/correction/map_filter.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/correction/transport_corrector.hpp>
+#include <decant/correction/warp_field.hpp>
+#include <decant/io/progress.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/io/table.hpp>
+#include <decant/simulation/parts.hpp>
+
+#include "support/result_file.hpp"
+#include "support/tracking_run.hpp"
+
+namespace {
+
+using Model = decant::LiquidSimulator;
+using Progressed = std::function<void(std::size_t)>;
+using Method = std::function<example::TrackingResult(const decant::Recording&, const Model&,
+                                                     const example::TrackingOptions&, const Progressed&)>;
+
+template <class CorrectorType>
+Method method() {
+  return [](const decant::Recording& recording, const Model& model, const example::TrackingOptions& options,
+            const Progressed& progress) {
+    return example::track_recording(recording, model, CorrectorType(), options, {}, progress);
+  };
+}
+
+/// By the names that scripts use. The two of the paper are as printed.
+const std::vector<std::pair<std::string, Method>>& methods() {
+  static const std::vector<std::pair<std::string, Method>> all{
+      {"open_loop", method<decant::OpenLoop<>>()},
+      {"map_filter", method<decant::MapFilterSchenck2017<>>()},
+      {"warp_field", method<decant::WarpFieldSchenck2017<>>()},
+      {"default", method<decant::TransportCorrector<>>()},
+  };
+  return all;
+}
+
+nlohmann::json json_of(const example::TrackingResult& result, const decant::Recording& recording,
+                       const std::vector<double>& forecasts) {
+  nlohmann::json json;
+  json["iou_mean"] = example::number_json(result.posterior.mean_over_frames());
+  json["iou_pooled"] = example::number_json(result.posterior.pooled_over_pixels());
+  json["iou"] = example::column_json(result.iou);
+  json["prior_iou"] = example::number_json(result.prior.mean_over_frames());
+  for (std::size_t k = 0; k < forecasts.size(); ++k) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "%g", forecasts[k]);
+    json["forecast_iou"][name] = example::number_json(result.forecasts[k].mean_over_frames());
+  }
+  json["log_likelihood"] = example::number_json(result.log_likelihood);
+  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+    if (!result.volume_ml[body].empty()) {
+      json["volume_ml"][recording.bodies[body].name] = example::column_json(result.volume_ml[body]);
+    }
+  }
+  const double seconds = 1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
+  json["frames_per_second"] = example::number_json(static_cast<double>(result.frames) / seconds);
+  json["relocated_ml"] = result.relocated_ml;
+  json["particles"] = result.particles;
+  json["status"] = result.status;
+  return json;
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  std::string folder, json_file;
+  std::vector<std::string> names{"open_loop", "default"};
+  example::TrackingOptions options;
+  options.forecasts = {0.25, 0.5, 1};
+  double spacing_mm = 1e3 * options.spacing;
+  bool without_forecasts = false;
+  CLI::App app("Keeps a simulation in step with the masks of a recording, by one or more methods.");
+  app.add_option("recording", folder, "folder of a recording, format version 1")->required();
+  std::vector<std::string> known;
+  for (const auto& [name, run] : methods()) {
+    known.push_back(name);
+  }
+  app.add_option("--corrector", names,
+                 "open_loop, map_filter, warp_field (both as printed), default; several by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(known));
+  app.add_option("--json", json_file, "writes the scores");
+  app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--threads", options.threads, "0: all")->check(CLI::Range(0, 1024));
+  app.add_flag("--no-forecasts", without_forecasts, "leaves out the scores ahead, which double the time");
+  try {
+    app.parse(count, values);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  options.spacing = 1e-3 * spacing_mm;
+  if (without_forecasts) {
+    options.forecasts.clear();
+  }
+  nlohmann::json json;
+  bool failed = false;
+  try {
+    if (!json_file.empty()) {
+      example::expect_writable(json_file);
+    }
+    const decant::Recording recording = decant::read_recording(folder);
+    const Model model = example::model_of<decant::DefaultParts<>>(recording, options);
+    std::printf("%s: %zu frames, %td particles of %.1f mm\n%-12s %6s %6s %6s %6s %8s\n", recording.name.c_str(),
+                recording.frames, model.fluid().size(), spacing_mm, "", "IoU", "pooled", "prior", "+0.5 s", "frames/s");
+    for (const std::string& name : names) {
+      for (const auto& [candidate, run] : methods()) {
+        if (candidate != name) {
+          continue;
+        }
+        decant::Progress progress(name, static_cast<double>(recording.frames));
+        const example::TrackingResult result =
+            run(recording, model, options, [&](std::size_t done) { progress.update(static_cast<double>(done)); });
+        progress.finish();
+        json["correctors"][name] = json_of(result, recording, options.forecasts);
+        failed = failed || result.status != "ok";
+        const double seconds =
+            1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
+        std::printf("%-12s %6.3f %6.3f %6.3f %6.3f %8.1f  %s\n", name.c_str(), result.posterior.mean_over_frames(),
+                    result.posterior.pooled_over_pixels(), result.prior.mean_over_frames(),
+                    result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
+                    static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
+        std::fflush(stdout);
+      }
+    }
+    if (!json_file.empty()) {
+      decant::detail::write_text_file(json_file, json.dump(1));
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  }
+  return failed ? 1 : 0;
+}
