@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 
 #include <decant/boundary/shapes.hpp>
@@ -10,6 +11,7 @@
 #include <decant/correction/open_loop.hpp>
 #include <decant/correction/transport_corrector.hpp>
 #include <decant/correction/warp_field.hpp>
+#include <decant/testing/corrector.hpp>
 
 #include "catch.hpp"
 #include "correction/seen.hpp"
@@ -199,6 +201,29 @@ TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is
   const Vector3<double> felt = 0.5 * volume * decant::CubicSpline<double>::value(0.004, h) * pull;
   CHECK((fluid.velocity.col(0) - own).norm() < 2e-3 * own.norm());  // the look-up's own error is 1e-3 at most
   CHECK((fluid.velocity.col(1) - felt).norm() < 2e-3 * felt.norm());
+}
+
+TEST_CASE("correctors: their laws") {
+  const auto fluid = liquid_block<float>({0, 0, 0});
+  Eye<float> right(decant_test::before_the_block()), wrong(decant_test::before_the_block());
+  right.observe(fluid);
+  wrong.observe(liquid_block<float>({0.01, 0, 0.004}));
+  const auto seen_right = std::array{right.predict(fluid)}, seen_wrong = std::array{wrong.predict(fluid)};
+  const Vector3<double> gravity(0, 0, -9.81);
+  const decant::Silhouettes<decant::DistortedPinholeCamera> nothing{{}, 0, 0.005, gravity, {1}},
+      perfect{seen_right, 0, 0.005, gravity, {1}}, other{seen_wrong, 0, 0.005, gravity, {1}};
+  const double anywhere = std::numeric_limits<double>::infinity();
+  const auto require_laws = [&](const auto& corrector, double still) {
+    for (const auto& law :
+         decant::testing::corrector_laws(corrector, fluid, nothing, perfect, other, 1.0f / 30, still)) {
+      INFO(law.text());
+      REQUIRE(law.holds());
+    }
+  };
+  require_laws(decant::OpenLoop<>(), 0);
+  require_laws(decant::TransportCorrector<>(), 1e-4);        // a tenth of a pixel
+  require_laws(decant::MapFilterSchenck2017<>(), anywhere);  // as printed, they move what is right
+  require_laws(decant::WarpFieldSchenck2017<>(), anywhere);
 }
 
 TEST_CASE("correctors: settings are checked") {
