@@ -30,6 +30,18 @@ decant::TriangleMesh box_mesh(const Vector3<double>& min, const Vector3<double>&
   return mesh;
 }
 
+// A room's corner: floor and one wall, as two slabs.
+decant::TriangleMesh room_corner() {
+  decant::TriangleMesh corner = box_mesh({-0.05, -0.05, -0.01}, {0.05, 0.05, 0});
+  const auto upright = box_mesh({-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05});
+  const auto shift = static_cast<std::uint32_t>(corner.vertices.size());
+  corner.vertices.insert(corner.vertices.end(), upright.vertices.begin(), upright.vertices.end());
+  for (const auto& t : upright.triangles) {
+    corner.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  }
+  return corner;
+}
+
 }  // namespace
 
 TEST_CASE("mesh wall agrees with the closed form of a plane on both sides of a thin plate") {
@@ -76,15 +88,7 @@ TEST_CASE("direct mesh wall sums reach the accuracy that is documented") {
 }
 
 TEST_CASE("mesh wall and solid parts agree in a corner") {
-  // a room's corner: floor and one wall, as two slabs
-  decant::TriangleMesh corner = box_mesh({-0.05, -0.05, -0.01}, {0.05, 0.05, 0});
-  const auto upright = box_mesh({-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05});
-  const auto shift = static_cast<std::uint32_t>(corner.vertices.size());
-  corner.vertices.insert(corner.vertices.end(), upright.vertices.begin(), upright.vertices.end());
-  for (const auto& t : upright.triangles) {
-    corner.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-  }
-  const decant::BoundingVolumeHierarchy surface(corner);
+  const decant::BoundingVolumeHierarchy surface(room_corner());
   const auto mesh = decant::MeshWall::of<Kernel>(surface, spacing, spacing, {});
   const auto parts = decant::SolidParts::of<Kernel>({decant::SolidBox{{-0.05, -0.05, -0.01}, {0.05, 0.05, 0}},
                                                      decant::SolidBox{{-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05}}},
@@ -104,14 +108,7 @@ TEST_CASE("mesh wall and solid parts agree in a corner") {
 }
 
 TEST_CASE("close to the surface, where the grid has no answer, a mesh wall still is what it should be") {
-  decant::TriangleMesh corner = box_mesh({-0.05, -0.05, -0.01}, {0.05, 0.05, 0});
-  const auto upright = box_mesh({-0.06, -0.05, -0.01}, {-0.05, 0.05, 0.05});
-  const auto shift = static_cast<std::uint32_t>(corner.vertices.size());
-  corner.vertices.insert(corner.vertices.end(), upright.vertices.begin(), upright.vertices.end());
-  for (const auto& t : upright.triangles) {
-    corner.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-  }
-  const decant::BoundingVolumeHierarchy surface(corner);
+  const decant::BoundingVolumeHierarchy surface(room_corner());
   const auto wall = decant::MeshWall::of<Kernel>(surface, spacing, spacing, {});
   const auto plane = decant::WallFunction::of<Kernel>(spacing, spacing);
   // where one wall is all there is: the closed form, with what 128 directions leave of it (above)
