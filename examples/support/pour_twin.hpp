@@ -14,6 +14,7 @@
 #include <random>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,7 @@
 #include <decant/io/recording_writer.hpp>
 #include <decant/kernel/wendland_c2.hpp>
 #include <decant/projector/silhouette.hpp>
+#include <decant/pressure/dfsph.hpp>
 #include <decant/pressure/position_based.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/parts.hpp>
@@ -131,6 +133,12 @@ struct RealityParts : decant::DefaultParts<float> {
   using Kernel = decant::WendlandC2<float>;
   using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>, Drag>;
   using PressureSolver = decant::PositionBased<float>;
+};
+
+/// The same liquid at rest: position-based fluids start badly from liquid that was packed, so another solver settles
+/// it.
+struct SettledParts : RealityParts {
+  using PressureSolver = decant::Dfsph<float>;
 };
 
 /// The container's mesh with its lip, in the container's frame.
@@ -293,7 +301,11 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   if constexpr (std::is_same_v<Parts, RealityParts>) {
     reality.template force<Drag>().rate = static_cast<float>(hidden.drag);
   }
-  const FillReport filled = decant::fill(reality, cup, FillAmount::fraction(twin.fill_fraction));
+  using Filling = std::conditional_t<std::is_same_v<Parts, RealityParts>, SettledParts, Parts>;
+  Simulator<Filling> filling(settings);
+  filling.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)));
+  const FillReport filled = decant::fill(filling, cup, FillAmount::fraction(twin.fill_fraction));
+  reality.add_particles(filling.fluid().position, filling.fluid().velocity, cup);
   reality.set_motion(cup, motion);
   reality.watch_contents(cup);
   reality.watch_contents(pan);

@@ -43,24 +43,22 @@ class PositionBased {
   /// epsilon over the denominator of a full neighbourhood [-], >= 0: softens particles with few neighbours.
   Scalar softness = Scalar(0.01);
 
-  /// Nothing is carried from step to step.
+  /// Carried from step to step.
   struct Memory {
+    double calm_pressure = 0;  ///< mean over what is under pressure, over rest density [m^2/s^2]; see largest_step
+
     void reorder(std::span<const std::uint32_t>) noexcept {}
-    void clear() noexcept {}
+    void clear() noexcept { calm_pressure = 0; }
   };
 
   Memory& memory() noexcept { return memory_; }
 
+  /// As for other solvers, by a pressure that follows quickly when it falls and slowly when it rises. What is too dense
+  /// is moved apart within one sub-step, however short: the shorter it is, the higher the pressure looks, and steps
+  /// that followed it would get ever shorter and turn a per cent of compression into metres per second.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
-    double total = 0, under_pressure = 0;
-    for (Index i = 0; i < step.fluid.size(); ++i) {
-      total += static_cast<double>(step.fluid.pressure[i]);
-      under_pressure += step.fluid.pressure[i] > 0 ? 1 : 0;
-    }
-    const double mean = total > 0 ? total / (under_pressure * static_cast<double>(step.rest_density)) : 0;
-    // shorter steps would turn what is too dense into speed: it is moved apart within one, however short
-    return largest_stable_step(step, mean, std::numeric_limits<double>::infinity());
+    return largest_stable_step(step, memory_.calm_pressure, std::numeric_limits<double>::infinity());
   }
 
   template <class Step>
@@ -105,10 +103,25 @@ class PositionBased {
       // The moves of a pressure p are dx_i = -dt^2 sum_j m_j (p_i + p_j) / rho^2 grad W_ij.
       step.fluid.pressure[i] = -total_[static_cast<std::size_t>(i)] * step.rest_density / (dt * dt);
     });
+    remember_pressure(step);
   }
 
  private:
   using B = Batch<Scalar>;
+
+  template <class Step>
+  void remember_pressure(const Step& step) noexcept {
+    double total = 0, under_pressure = 0;
+    for (Index i = 0; i < step.fluid.size(); ++i) {
+      total += static_cast<double>(step.fluid.pressure[i]);
+      under_pressure += step.fluid.pressure[i] > 0 ? 1 : 0;
+    }
+    const double mean = total > 0 ? total / (under_pressure * static_cast<double>(step.rest_density)) : 0;
+    double& calm = memory_.calm_pressure;
+    // by a fifth per sub-step, and from nothing by that of about the weight of one layer
+    const double one_layer = 10 * static_cast<double>(step.spacing);
+    calm = std::min(mean, calm + 0.2 * std::max(calm, one_layer));
+  }
 
   /// Separations at the predicted positions, pair by pair: those of the list and the difference of what was moved.
   /// Works in periodic domains as well.
