@@ -18,6 +18,7 @@
 
 #include <decant/correction/map_filter.hpp>
 #include <decant/correction/open_loop.hpp>
+#include <decant/correction/silhouette_corrector.hpp>
 #include <decant/correction/transport_corrector.hpp>
 #include <decant/correction/warp_field.hpp>
 #include <decant/io/progress.hpp>
@@ -49,7 +50,8 @@ const std::vector<std::pair<std::string, Method>>& methods() {
       {"open_loop", method<decant::OpenLoop<>>()},
       {"map_filter", method<decant::MapFilterSchenck2017<>>()},
       {"warp_field", method<decant::WarpFieldSchenck2017<>>()},
-      {"default", method<decant::TransportCorrector<>>()},
+      {"transport", method<decant::TransportCorrector<>>()},
+      {"default", method<decant::SilhouetteCorrector<>>()},
   };
   return all;
 }
@@ -96,7 +98,7 @@ int main(int count, char** values) {
     known.push_back(name);
   }
   app.add_option("--corrector", names,
-                 "open_loop, map_filter, warp_field (both as printed), default; several by commas")
+                 "open_loop, map_filter, warp_field (both as printed), transport, default; several by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(known));
   app.add_option("--json", json_file, "writes the scores");

@@ -8,7 +8,9 @@
 
 #include <decant/boundary/shapes.hpp>
 #include <decant/correction/map_filter.hpp>
+#include <decant/correction/mass_relocation.hpp>
 #include <decant/correction/open_loop.hpp>
+#include <decant/correction/silhouette_corrector.hpp>
 #include <decant/correction/transport_corrector.hpp>
 #include <decant/correction/warp_field.hpp>
 #include <decant/testing/corrector.hpp>
@@ -140,6 +142,7 @@ TEST_CASE("correctors: the same bits for any number of threads") {
     REQUIRE((first.position != untouched.position || first.velocity != untouched.velocity));
   };
   require_same([] { return decant::TransportCorrector<>(); });
+  require_same([] { return decant::SilhouetteCorrector<>(); });
   require_same([] { return decant::MapFilterSchenck2017<>(); });
   require_same([] { return decant::WarpFieldSchenck2017<>(); });
 }
@@ -203,6 +206,80 @@ TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is
   CHECK((fluid.velocity.col(1) - felt).norm() < 2e-3 * felt.norm());
 }
 
+TEST_CASE("mass relocation: fills what is seen two frames running from what is nowhere seen, and counts its moves") {
+  // a block that is seen, a clump right of it that is not, and liquid left of it that is seen and not simulated
+  auto fluid = liquid_block<float>({0, 0, 0});
+  for (Index i = 0; i < 64; ++i) {
+    fluid.position.col(i) += Eigen::Vector3f(0.06f, 0, 0.02f);
+  }
+  const auto start = fluid;
+  Eye<float> eye(decant_test::before_the_block());
+  eye.observe(start);
+  eye.observed.rightCols(62).setZero();
+  eye.observed.block(60, 50, 20, 20).setConstant(decant::mask_liquid);
+  decant::MassRelocation<> relocation;
+  CHECK(correct(relocation, fluid, std::array{&eye}).moved == 0);  // seen once: may be noise
+  CHECK(fluid.position == start.position);
+  auto views = std::array{eye.predict(fluid)};
+  const auto report = relocation.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0f / 30);
+  CHECK(report.relocated > 5);
+  CHECK(report.relocated <= 20);  // 4 % of 512
+  Index changed = 0;
+  for (Index i = 0; i < fluid.size(); ++i) {
+    if (fluid.position.col(i) == start.position.col(i)) {
+      continue;
+    }
+    ++changed;
+    CHECK(start.position(0, i) > 0.03f);  // from the clump
+    const auto now = eye.sight.camera().project(fluid.position.col(i).cast<double>());
+    CHECK(now.visible);
+    CHECK(std::abs(now.pixel.x() - 59.5) < 11);  // to where liquid is seen
+    CHECK(std::abs(now.pixel.y() - 69.5) < 11);
+    CHECK(now.depth == Approx(0.5).margin(0.02));  // at the depth of the liquid next to it
+  }
+  CHECK(changed == report.relocated);
+  // after a reset nothing is known of the frame before
+  auto again = start;
+  relocation.reset();
+  CHECK(correct(relocation, again, std::array{&eye}).moved == 0);
+}
+
+TEST_CASE(
+    "mass relocation: hidden liquid gives what the image shows more, from its top, and takes back what it shows less") {
+  // the upper half stands behind a plate, the lower half is in sight
+  auto fluid = liquid_block<float>({0, 0, 0});
+  Eye<float> eye(decant_test::before_the_block());
+  eye.sight.add(
+      std::make_shared<const decant::BoundingVolumeHierarchy>(decant::Box{{-0.1, -0.11, 0}, {0.1, -0.1, 0.1}}.mesh()));
+  eye.observe(fluid);
+  decant::MassRelocation<> relocation;
+  const auto start = fluid;
+  eye.observed.block(100, 85, 30, 30).setConstant(decant::mask_liquid);  // more below
+  correct(relocation, fluid, std::array{&eye});
+  CHECK(correct(relocation, fluid, std::array{&eye}).moved > 3);
+  for (Index i = 0; i < fluid.size(); ++i) {
+    if (fluid.position.col(i) != start.position.col(i)) {
+      CHECK(start.position(2, i) > 0.01f);  // of 20 mm: from the top of what is hidden
+      CHECK(fluid.position(2, i) < -0.01f);
+    }
+  }
+  // less than is simulated: a clump that fell too early goes back behind the plate
+  fluid = start;
+  for (Index i = 256; i < 384; ++i) {
+    fluid.position(2, i) -= 0.045f;  // out of the hidden half
+  }
+  eye.observe(start);
+  relocation.reset();
+  const auto before = fluid;
+  CHECK(correct(relocation, fluid, std::array{&eye}).moved > 3);
+  for (Index i = 0; i < fluid.size(); ++i) {
+    if (fluid.position.col(i) != before.position.col(i)) {
+      CHECK(before.position(2, i) < -0.035f);
+      CHECK(fluid.position(2, i) > 0);
+    }
+  }
+}
+
 TEST_CASE("correctors: their laws") {
   const auto fluid = liquid_block<float>({0, 0, 0});
   Eye<float> right(decant_test::before_the_block()), wrong(decant_test::before_the_block());
@@ -221,7 +298,9 @@ TEST_CASE("correctors: their laws") {
     }
   };
   require_laws(decant::OpenLoop<>(), 0);
-  require_laws(decant::TransportCorrector<>(), 1e-4);        // a tenth of a pixel
+  require_laws(decant::TransportCorrector<>(), 1e-4);  // a tenth of a pixel
+  require_laws(decant::MassRelocation<>(), 0);
+  require_laws(decant::SilhouetteCorrector<>(), 1e-4);
   require_laws(decant::MapFilterSchenck2017<>(), anywhere);  // as printed, they move what is right
   require_laws(decant::WarpFieldSchenck2017<>(), anywhere);
 }
