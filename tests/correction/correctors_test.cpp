@@ -242,6 +242,11 @@ TEST_CASE("mass relocation: fills what is seen two frames running from what is n
   auto again = start;
   relocation.reset();
   CHECK(correct(relocation, again, std::array{&eye}).moved == 0);
+  // and what is seen in one place now and in another then is not seen two frames running
+  eye.observed.block(60, 50, 20, 20).setZero();
+  eye.observed.block(100, 50, 20, 20).setConstant(decant::mask_liquid);
+  CHECK(correct(relocation, again, std::array{&eye}).moved == 0);
+  CHECK(correct(relocation, again, std::array{&eye}).moved > 5);
 }
 
 TEST_CASE(
