@@ -28,7 +28,7 @@ struct MapFilterSettings {
 /// that no camera sees stay; of equal hypotheses the nearest to the prediction wins.
 /// Not to be recommended: the largest of 27 is hardly ever the middle one, so that the filter moves particles even
 /// where prediction and observation agree, up to 5 mm a frame and axis, which is 0.15 m/s, and all liquid contracts to
-/// the middle of its silhouette.
+/// the middle of its silhouette: on one recording of a pour, open loop scored 0.740, this filter 0.549.
 template <class ScalarType = float, class CameraType = DistortedPinholeCamera>
 class MapFilterSchenck2017 {
  public:
