@@ -125,6 +125,7 @@ TrackingResult track_recording(
     std::vector<CameraMask> masks;
     kept.reserve(recording.cameras.size());
     for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
+      tracker.set_camera_pose(camera, recording.cameras[camera].view(frame).camera_from_world);
       if (std::optional<Mask> mask = recording.mask(frame, camera)) {
         kept.push_back(std::move(*mask));
         masks.push_back({camera, kept.back()});
