@@ -78,12 +78,12 @@ TEMPLATE_TEST_CASE("simulator: a frame takes its time and reports what there is"
 }
 
 TEST_CASE("simulator: a status has a name") {
-  CHECK(to_string(StepStatus::ok) == "ok");
-  CHECK(to_string(StepStatus::not_converged) == "not converged");
-  CHECK(to_string(StepStatus::bad_time_step) == "bad time step");
-  CHECK(to_string(StepStatus::too_many_steps) == "too many sub-steps");
-  CHECK(to_string(StepStatus::non_finite) == "non-finite");
-  CHECK(to_string(static_cast<StepStatus>(99)) == "unknown");
+  CHECK(std::string(to_string(StepStatus::ok)) == "ok");
+  CHECK(std::string(to_string(StepStatus::not_converged)) == "not converged");
+  CHECK(std::string(to_string(StepStatus::bad_time_step)) == "bad time step");
+  CHECK(std::string(to_string(StepStatus::too_many_steps)) == "too many sub-steps");
+  CHECK(std::string(to_string(StepStatus::non_finite)) == "non-finite");
+  CHECK(std::string(to_string(static_cast<StepStatus>(99))) == "unknown");
 }
 
 TEMPLATE_TEST_CASE("simulator: free fall without bodies is exact to the step", "", float, double) {
