@@ -17,10 +17,11 @@
 #include <nlohmann/json.hpp>
 
 #include <decant/correction/map_filter.hpp>
+#include <decant/correction/map_filter_schenck2017.hpp>
 #include <decant/correction/open_loop.hpp>
 #include <decant/correction/silhouette_corrector.hpp>
 #include <decant/correction/transport_corrector.hpp>
-#include <decant/correction/warp_field.hpp>
+#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/io/progress.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/table.hpp>
@@ -49,6 +50,7 @@ const std::vector<std::pair<std::string, Method>>& methods() {
   static const std::vector<std::pair<std::string, Method>> all{
       {"open_loop", method<decant::OpenLoop<>>()},
       {"map_filter", method<decant::MapFilterSchenck2017<>>()},
+      {"map_filter_mended", method<decant::MapFilter<>>()},
       {"warp_field", method<decant::WarpFieldSchenck2017<>>()},
       {"transport", method<decant::TransportCorrector<>>()},
       {"default", method<decant::SilhouetteCorrector<>>()},

@@ -29,6 +29,7 @@
 #include <decant/projector/silhouette.hpp>
 #include <decant/pressure/dfsph.hpp>
 #include <decant/pressure/position_based.hpp>
+#include <decant/pressure/state_equation.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
@@ -44,7 +45,7 @@ struct PourTwin {
   bool noisy_poses = true;
   bool noisy_masks = true;
   double spacing = 0.0037;  ///< of the reality's particles [m]
-  double duration = 5;      ///< [s]
+  double duration = 4;      ///< [s]
   double frames_per_second = 30;
 };
 
@@ -82,29 +83,28 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   const auto between = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
   };
-  const auto sign = [&] { return random() % 2 == 0 ? 1.0 : -1.0; };
   std::vector<int> kinds{0, 1, 2, 3, 4};
   std::shuffle(kinds.begin(), kinds.end(), random);
   for (int k = 0; k < 2; ++k) {
     switch (kinds[static_cast<std::size_t>(k)]) {
       case 0: {
-        const double size = between(0.7, 1.2);
+        const double size = between(1.0, 1.5);
         const double angle = between(0, 2 * std::numbers::pi);
         hidden.pull = {size * std::cos(angle), size * std::sin(angle), 0};
         break;
       }
       case 1:
-        hidden.drag = between(0.8, 1.6);
+        hidden.drag = between(1.5, 3);
         break;
       case 2:  // what a boundary layer does that is thinner than a particle
         hidden.sticky_walls = true;
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 1e-4);
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 2e-4);
         break;
       case 3:
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.0, -3.3)));
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-3.7, -3.0)));
         break;
       case 4:
-        hidden.latency = sign() > 0 ? between(0.07, 0.13) : between(0.05, 0.1);
+        hidden.latency = between(0.09, 0.14);
         break;
       default:
         break;
@@ -129,17 +129,15 @@ struct Drag {
   }
 };
 
+template <class PressureSolverType>
 struct RealityParts : decant::DefaultParts<float> {
   using Kernel = decant::WendlandC2<float>;
   using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>, Drag>;
-  using PressureSolver = decant::PositionBased<float>;
+  using PressureSolver = PressureSolverType;
 };
 
-/// The same liquid at rest: position-based fluids start badly from liquid that was packed, so another solver settles
-/// it.
-struct SettledParts : RealityParts {
-  using PressureSolver = decant::Dfsph<float>;
-};
+/// The same liquid at rest is settled by a third solver: these two start badly from liquid that was packed.
+using SettledParts = RealityParts<decant::Dfsph<float>>;
 
 /// The container's mesh with its lip, in the container's frame.
 struct PourContainer {
@@ -298,10 +296,17 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   const Slip slip = hidden.sticky_walls ? Slip::none : Slip::free;
   const BodyId cup = reality.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)), slip);
   const BodyId pan = reality.add_body("pan", pour_pan());
-  if constexpr (std::is_same_v<Parts, RealityParts>) {
+  constexpr bool foreign = !std::is_same_v<Parts, DefaultParts<float>>;
+  if constexpr (foreign) {
     reality.template force<Drag>().rate = static_cast<float>(hidden.drag);
   }
-  using Filling = std::conditional_t<std::is_same_v<Parts, RealityParts>, SettledParts, Parts>;
+  if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
+    StateEquation<float>& solver = reality.pressure_solver();
+    solver.set_sound_speed(14, static_cast<float>(settings.liquid.density));  // six times as fast as the jet
+    solver.courant_number = 0.6F;
+    solver.artificial_viscosity = 0.03F;
+  }
+  using Filling = std::conditional_t<foreign, SettledParts, Parts>;
   Simulator<Filling> filling(settings);
   filling.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)));
   const FillReport filled = decant::fill(filling, cup, FillAmount::fraction(twin.fill_fraction));
@@ -343,7 +348,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
 
   RayOcclusion<PinholeCamera> sight(PosedCamera<PinholeCamera>(camera, camera_from_world));
   sight.add_bodies(reality.bodies(), 0);
-  Silhouette<DiscSplat<float>> drawing(DiscSplat<float>(0.62 * twin.spacing), GapClosing(2));
+  Silhouette<DiscSplat<float>> drawing(DiscSplat<float>(0.62 * twin.spacing), GapClosing(4));
   MaskNoise noise(twin.seed);
   Mask clean(camera.height(), camera.width());
   std::vector<std::uint8_t> unseen;
@@ -401,8 +406,10 @@ inline void record_pour(
   decant::expects(twin.fill_fraction > 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in (0, 1]",
                   twin.fill_fraction);
   const HiddenPhysics hidden = draw_hidden_physics(twin);
-  if (twin.hidden_physics) {
-    detail::record_pour<RealityParts>(twin, hidden, folder, progress);
+  if (twin.hidden_physics && twin.container == "cup") {
+    detail::record_pour<RealityParts<decant::PositionBased<float>>>(twin, hidden, folder, progress);
+  } else if (twin.hidden_physics) {  // deep and narrow, which position-based fluids do not stand
+    detail::record_pour<RealityParts<decant::StateEquation<float>>>(twin, hidden, folder, progress);
   } else {
     detail::record_pour<decant::DefaultParts<>>(twin, hidden, folder, progress);
   }

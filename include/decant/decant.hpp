@@ -47,11 +47,14 @@
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/map_filter.hpp>
+#include <decant/correction/map_filter_schenck2017.hpp>
+#include <decant/correction/mass_relocation.hpp>
 #include <decant/correction/open_loop.hpp>
+#include <decant/correction/silhouette_corrector.hpp>
 #include <decant/correction/silhouette_transport.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/correction/transport_corrector.hpp>
-#include <decant/correction/warp_field.hpp>
+#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/image_kernel.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
@@ -103,6 +106,7 @@
 #include <decant/simulation/step_report.hpp>
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/liquid_model.hpp>
+#include <decant/tracking/mask_trust.hpp>
 #include <decant/tracking/overlap.hpp>
 #include <decant/tracking/overlap_score.hpp>
 #include <decant/tracking/tracker.hpp>

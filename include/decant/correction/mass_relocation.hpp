@@ -27,7 +27,6 @@ struct MassRelocationSettings {
   double share_per_frame = 0.04;  ///< of all particles that may be taken elsewhere, 0 .. 1
   double balance = 0.5;           ///< of the difference in area that hidden liquid may make up for per frame, 0 .. 1
   double nearest_px = 90;         ///< farther from all simulated liquid in sight nothing is known of depth, > 0
-  int least_pixels = 150;         ///< of liquid that a mask must show to be trusted, >= 1
 };
 
 /// The amount of liquid never changes, and every move is counted. Liquid that is seen where none is simulated, two
@@ -59,16 +58,15 @@ class MassRelocation {
     expects(settings.share_per_frame >= 0 && settings.share_per_frame <= 1, "MassRelocation: share_per_frame", "0 .. 1",
             settings.share_per_frame);
     expects(settings.balance >= 0 && settings.balance <= 1, "MassRelocation: balance", "0 .. 1", settings.balance);
-    expects(settings.least_pixels >= 1, "MassRelocation: least_pixels", ">= 1", settings.least_pixels);
   }
 
   void reset() noexcept { unexplained_before_.clear(); }
 
   CorrectionReport correct(FluidState<Scalar>& fluid, const Observation& seen, Scalar) noexcept {
     CorrectionReport report;
-    unexplained_before_.resize(std::max(unexplained_before_.size(), seen.views.size()));
-    for (std::size_t k = 0; k < seen.views.size(); ++k) {
-      report.relocated += relocate(fluid, seen, seen.views[k], unexplained_before_[k]);
+    for (const SilhouetteView<CameraType>& view : seen.views) {
+      unexplained_before_.resize(std::max(unexplained_before_.size(), view.number + 1));
+      report.relocated += relocate(fluid, seen, view, unexplained_before_[view.number]);
     }
     report.moved = report.relocated;
     return report;
@@ -89,9 +87,6 @@ class MassRelocation {
   Index relocate(FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
                  Mask& unexplained_before) noexcept {
     const Index observed_px = (*view.observed >= 128).count(), predicted_px = (*view.predicted >= 128).count();
-    if (observed_px < settings_.least_pixels) {
-      return 0;
-    }
     to_observed_.rebuild(*view.observed, MaskPart::liquid, seen.threads);
     to_predicted_.rebuild(*view.predicted, MaskPart::liquid, seen.threads);
     find_wanted(view, unexplained_before);
@@ -177,10 +172,14 @@ class MassRelocation {
     in_sight_.clear();
     misplaced_.clear();
     hidden_.clear();
+    behind_walls_.clear();
     for (Index i = 0; i < fluid.size(); ++i) {
       const Projection at = view.camera().project(fluid.position.col(i).template cast<double>());
       if (view.hidden[static_cast<std::size_t>(i)] != 0) {
         hidden_.push_back(i);
+        if (at.visible) {
+          behind_walls_.push_back({i, at.pixel, at.depth, 0});
+        }
       } else if (at.visible) {
         const auto v = static_cast<Index>(std::lround(at.pixel.y())), u = static_cast<Index>(std::lround(at.pixel.x()));
         const double off = static_cast<double>(to_observed_.distance_px()(v, u));
@@ -207,18 +206,29 @@ class MassRelocation {
     return std::max(spacing * spacing * mean, 1.0);
   }
 
-  /// Where liquid that is seen at a pixel would be, and how fast, by the simulated liquid in sight nearest to it.
-  bool place_at(const FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
-                const Eigen::Vector2d& pixel, Vector3<double>& place, Vector3<double>& velocity) const noexcept {
+  /// Of the particles that are where liquid is seen, the one nearest to a pixel. What is misplaced itself says nothing
+  /// of where liquid is.
+  const InSight* nearest_to(const Eigen::Vector2d& pixel, const std::vector<InSight>& candidates) const noexcept {
     const InSight* nearest = nullptr;
     double least = settings_.nearest_px * settings_.nearest_px;
-    for (const InSight& candidate : in_sight_) {
+    for (const InSight& candidate : candidates) {
       const double squared = (candidate.pixel - pixel).squaredNorm();
-      // what is misplaced itself says nothing of where liquid is
       if (squared < least && candidate.off_px <= settings_.misplaced_px) {
         least = squared;
         nearest = &candidate;
       }
+    }
+    return nearest;
+  }
+
+  /// Where liquid that is seen at a pixel would be, and how fast, by the simulated liquid in sight nearest to it; by
+  /// the nearest behind a wall if there is none: then it has come from there in free fall.
+  bool place_at(const FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
+                const Eigen::Vector2d& pixel, Vector3<double>& place, Vector3<double>& velocity) const noexcept {
+    const InSight* nearest = nearest_to(pixel, in_sight_);
+    const bool emerging = nearest == nullptr;
+    if (emerging) {
+      nearest = nearest_to(pixel, behind_walls_);
     }
     if (nearest == nullptr) {
       return false;
@@ -232,6 +242,13 @@ class MassRelocation {
     }
     place = view.camera().unproject(pixel, depth);
     velocity = fluid.velocity.col(nearest->particle).template cast<double>();
+    const Vector3<double> path = place - fluid.position.col(nearest->particle).template cast<double>();
+    const double acceleration = seen.gravity.norm();
+    const double fall = acceleration > 0 ? path.dot(seen.gravity) / acceleration : 0;
+    if (emerging && fall > 0) {
+      const double time = std::sqrt(2 * fall / acceleration);
+      velocity = (path - fall / acceleration * seen.gravity) / time + time * seen.gravity;
+    }
     return place.allFinite();
   }
 
@@ -275,6 +292,7 @@ class MassRelocation {
   std::vector<Mask> unexplained_before_{};
   std::vector<InSight> in_sight_{};
   std::vector<std::size_t> misplaced_{};  ///< in in_sight_
+  std::vector<InSight> behind_walls_{};   ///< but in the image
   std::vector<Index> hidden_{};           ///< from the top
   std::vector<Wanted> wanted_{};
   std::vector<Eigen::Vector2d> chosen_{};

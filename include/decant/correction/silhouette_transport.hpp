@@ -13,17 +13,16 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
-#include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 
 namespace decant {
 
 /// Settings of SilhouetteTransport. Lengths are in pixels of the image.
 struct SilhouetteTransportSettings {
-  double cell_px = 4;          ///< pixels are taken together in squares of this side, >= 1
+  double cell_px = 4;          ///< distance of the grid's nodes, which stand for the pixels around them, >= 1
   double blur_px = 4;          ///< square root of the entropy's weight, > 0: what is finer is not told apart
   double reach_px = 40;        ///< moving mass farther costs more than to leave it unmatched, > blur_px
-  int most_cells = 1500;       ///< of either silhouette; cells grow where there would be more, >= 16
+  int most_nodes = 20000;      ///< of the grid around both silhouettes; cells grow where there would be more, >= 100
   int iterations = 50;         ///< of the matching, >= 1
   int debias_iterations = 25;  ///< of the matching of the prediction with itself, >= 1
 };
@@ -33,6 +32,10 @@ struct SilhouetteTransportSettings {
 /// "Scaling algorithms for unbalanced optimal transport problems"), and what the entropy alone would move is taken off
 /// (Feydy et al. 2019, "Interpolating between optimal transport and MMD using Sinkhorn divergences"), so that equal
 /// masks give a displacement of exactly zero, whatever their shape.
+/// Masks are spread to the nodes of one grid, which keeps their centroids, and on a grid the kernel
+/// exp(-|x - y|^2 / blur^2) is a convolution along rows and one along columns (Solomon et al. 2015, "Convolutional
+/// Wasserstein distances"): the cost per iteration grows with the nodes and not with their square. Beyond seven blurs
+/// the kernel is cut off.
 class SilhouetteTransport {
  public:
   using Settings = SilhouetteTransportSettings;
@@ -47,44 +50,46 @@ class SilhouetteTransport {
             settings.blur_px);
     expects(settings.reach_px > settings.blur_px && settings.reach_px < 1e5, "SilhouetteTransport: reach_px",
             "> blur_px and < 100000", settings.reach_px);
-    expects(settings.most_cells >= 16 && settings.most_cells <= 100000, "SilhouetteTransport: most_cells",
-            "16 .. 100000", settings.most_cells);
+    expects(settings.most_nodes >= 100 && settings.most_nodes <= 10000000, "SilhouetteTransport: most_nodes",
+            "100 .. 10000000", settings.most_nodes);
     expects(settings.iterations >= 1, "SilhouetteTransport: iterations", ">= 1", settings.iterations);
     expects(settings.debias_iterations >= 1, "SilhouetteTransport: debias_iterations", ">= 1",
             settings.debias_iterations);
   }
 
   /// Matches two masks of one size. @return false if either is empty: displacement() is then zero everywhere.
-  bool match(ConstMaskView predicted, ConstMaskView observed, Threads threads = {}) {
+  bool match(ConstMaskView predicted, ConstMaskView observed) {
     nodes_x_ = nodes_y_ = 0;
-    collect(predicted, from_);
-    collect(observed, to_);
-    if (from_.size() == 0 || to_.size() == 0 || predicted.rows() != observed.rows() ||
-        predicted.cols() != observed.cols()) {
+    Box box;
+    if (predicted.rows() != observed.rows() || predicted.cols() != observed.cols() || !box.include(predicted) ||
+        !box.include(observed)) {
       return false;
     }
-    find_scales(threads);
-    find_debiasing_scales(threads);
-    tabulate(threads);
+    lay_grid(box);
+    spread(predicted, box, from_);
+    spread(observed, box, to_);
+    find_scales();
+    find_debiasing_scales();
+    find_displacements();
     return true;
   }
 
   /// How far [px] what is predicted at `pixel` has to move. Zero where nothing was predicted nearby, and for NaN.
   Eigen::Vector2d displacement(const Eigen::Vector2d& pixel) const noexcept {
-    const double x = (pixel.x() - origin_.x()) / node_spacing_, y = (pixel.y() - origin_.y()) / node_spacing_;
-    if (!(x >= 0 && y >= 0 && x <= nodes_x_ - 1 && y <= nodes_y_ - 1)) {
+    const double x = (pixel.x() - origin_.x()) / spacing_, y = (pixel.y() - origin_.y()) / spacing_;
+    if (!(x >= 0 && y >= 0 && x <= static_cast<double>(nodes_x_ - 1) && y <= static_cast<double>(nodes_y_ - 1))) {
       return Eigen::Vector2d::Zero();
     }
-    const int left = std::min(static_cast<int>(x), nodes_x_ - 2), top = std::min(static_cast<int>(y), nodes_y_ - 2);
-    const double right_share = x - left, lower_share = y - top;
+    const Index left = std::min(static_cast<Index>(x), nodes_x_ - 2),
+                top = std::min(static_cast<Index>(y), nodes_y_ - 2);
+    const double right_share = x - static_cast<double>(left), lower_share = y - static_cast<double>(top);
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();
     double weight = 0;
-    for (int dy = 0; dy < 2; ++dy) {
-      for (int dx = 0; dx < 2; ++dx) {
-        const Node& node = nodes_[static_cast<std::size_t>((top + dy) * nodes_x_ + left + dx)];
+    for (Index dy = 0; dy < 2; ++dy) {
+      for (Index dx = 0; dx < 2; ++dx) {
         const double share = (dx == 1 ? right_share : 1 - right_share) * (dy == 1 ? lower_share : 1 - lower_share);
-        if (node.valid) {
-          sum += share * node.displacement;
+        if (near_prediction_(top + dy, left + dx)) {
+          sum += share * Eigen::Vector2d(shift_x_(top + dy, left + dx), shift_y_(top + dy, left + dx));
           weight += share;
         }
       }
@@ -93,177 +98,208 @@ class SilhouetteTransport {
   }
 
  private:
-  /// Pixels of a silhouette taken together: where, and how many.
-  struct Cells {
-    Eigen::ArrayXd x, y, mass, log_scale;  ///< scale: v of the matching, or u0 of the prediction's with itself
-    double side = 0;                       ///< of the squares [px]
-    Index size() const noexcept { return x.size(); }
-  };
+  using Grid = Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  struct Node {
-    Eigen::Vector2d displacement = Eigen::Vector2d::Zero();
-    bool valid = false;
-  };
+  /// The pixels that liquid lies in.
+  struct Box {
+    Index top = std::numeric_limits<Index>::max(), bottom = -1, left = top, right = -1;
 
-  void collect(const ConstMaskView& mask, Cells& cells) {
-    Index top = mask.rows(), bottom = -1, left = mask.cols(), right = -1;
-    for (Index row = 0; row < mask.rows(); ++row) {
-      for (Index column = 0; column < mask.cols(); ++column) {
-        if (is_liquid(mask(row, column))) {
-          top = std::min(top, row);
-          bottom = std::max(bottom, row);
-          left = std::min(left, column);
-          right = std::max(right, column);
-        }
-      }
-    }
-    for (cells.side = settings_.cell_px;; cells.side *= 1.25) {
-      const Index across =
-          bottom < top ? 0 : static_cast<Index>(static_cast<double>(right - left + 1) / cells.side) + 1;
-      const Index down = bottom < top ? 0 : static_cast<Index>(static_cast<double>(bottom - top + 1) / cells.side) + 1;
-      sums_.assign(static_cast<std::size_t>(across * down), Eigen::Array3d::Zero());
-      for (Index row = top; row <= bottom; ++row) {
-        for (Index column = left; column <= right; ++column) {
+    bool include(const ConstMaskView& mask) noexcept {
+      bool any = false;
+      for (Index row = 0; row < mask.rows(); ++row) {
+        for (Index column = 0; column < mask.cols(); ++column) {
           if (is_liquid(mask(row, column))) {
-            const auto cell_row = static_cast<Index>(static_cast<double>(row - top) / cells.side);
-            const auto cell_column = static_cast<Index>(static_cast<double>(column - left) / cells.side);
-            sums_[static_cast<std::size_t>(cell_row * across + cell_column)] +=
-                Eigen::Array3d(static_cast<double>(column), static_cast<double>(row), 1.0);
+            any = true;
+            top = std::min(top, row);
+            bottom = std::max(bottom, row);
+            left = std::min(left, column);
+            right = std::max(right, column);
           }
         }
       }
-      const auto count = static_cast<Index>(
-          std::count_if(sums_.begin(), sums_.end(), [](const Eigen::Array3d& sum) { return sum[2] > 0; }));
-      if (count > settings_.most_cells) {
-        continue;
+      return any;
+    }
+  };
+
+  /// A silhouette on the grid.
+  struct Silhouette {
+    std::vector<Index> nodes{};      ///< that have mass
+    Eigen::ArrayXd mass{}, scale{};  ///< of these [px^2]; scale: v of the matching, or u0 of the prediction with itself
+  };
+
+  void lay_grid(const Box& box) {
+    const auto width = static_cast<double>(box.right - box.left), height = static_cast<double>(box.bottom - box.top);
+    for (spacing_ = settings_.cell_px;; spacing_ *= 1.25) {
+      nodes_x_ = static_cast<Index>(width / spacing_) + 2 + 2 * margin_nodes;
+      nodes_y_ = static_cast<Index>(height / spacing_) + 2 + 2 * margin_nodes;
+      if (nodes_x_ * nodes_y_ <= settings_.most_nodes) {
+        break;
       }
-      for (Eigen::ArrayXd* values : {&cells.x, &cells.y, &cells.mass, &cells.log_scale}) {
-        values->resize(count);
-      }
-      Index next = 0;
-      for (const Eigen::Array3d& sum : sums_) {
-        if (sum[2] > 0) {
-          cells.x[next] = sum[0] / sum[2];
-          cells.y[next] = sum[1] / sum[2];
-          cells.mass[next++] = sum[2];
-        }
-      }
-      return;
+    }
+    origin_ = {static_cast<double>(box.left) - margin_nodes * spacing_,
+               static_cast<double>(box.top) - margin_nodes * spacing_};
+    // the blur grows with the nodes' distance: a kernel narrower than that would not see its neighbors
+    blur_ = settings_.blur_px * spacing_ / settings_.cell_px;
+    const auto radius = static_cast<Index>(std::sqrt(-std::log(kernel_floor)) * blur_ / spacing_);
+    weights_.resize(radius + 1);
+    for (Index k = 0; k <= radius; ++k) {
+      weights_[k] = std::exp(-std::pow(static_cast<double>(k) * spacing_ / blur_, 2));
+    }
+    for (Grid* grid : {&values_, &rows_done_, &product_, &shift_x_, &shift_y_}) {
+      grid->resize(nodes_y_, nodes_x_);
     }
   }
 
-  double entropy() const noexcept { return settings_.blur_px * settings_.blur_px; }
+  /// Each pixel's mass goes to the four nodes around it, by its distance to them: the centroid stays where it is.
+  void spread(const ConstMaskView& mask, const Box& box, Silhouette& silhouette) {
+    values_.setZero();
+    for (Index row = box.top; row <= box.bottom; ++row) {
+      const double y = (static_cast<double>(row) - origin_.y()) / spacing_;
+      const auto top = static_cast<Index>(y);
+      const double lower_share = y - static_cast<double>(top);
+      for (Index column = box.left; column <= box.right; ++column) {
+        if (is_liquid(mask(row, column))) {
+          const double x = (static_cast<double>(column) - origin_.x()) / spacing_;
+          const auto left = static_cast<Index>(x);
+          const double right_share = x - static_cast<double>(left);
+          values_(top, left) += (1 - lower_share) * (1 - right_share);
+          values_(top, left + 1) += (1 - lower_share) * right_share;
+          values_(top + 1, left) += lower_share * (1 - right_share);
+          values_(top + 1, left + 1) += lower_share * right_share;
+        }
+      }
+    }
+    silhouette.nodes.clear();
+    for (Index node = 0; node < values_.size(); ++node) {
+      if (values_.data()[node] > 0) {
+        silhouette.nodes.push_back(node);
+      }
+    }
+    gather(values_, silhouette.nodes, silhouette.mass);
+    silhouette.scale.setOnes(silhouette.mass.size());
+  }
+
+  static void gather(const Grid& grid, const std::vector<Index>& nodes, Eigen::ArrayXd& values) {
+    values.resize(static_cast<Index>(nodes.size()));
+    for (std::size_t k = 0; k < nodes.size(); ++k) {
+      values[static_cast<Index>(k)] = grid.data()[nodes[k]];
+    }
+  }
+
+  /// product = kernel * values, on all nodes.
+  void convolve(const Grid& values, Grid& product) {
+    const Index radius = weights_.size() - 1;
+    for (Index row = 0; row < nodes_y_; ++row) {
+      auto out = rows_done_.row(row);
+      out = values.row(row);  // the weight in the middle is 1
+      for (Index k = 1; k <= std::min(radius, nodes_x_ - 1); ++k) {
+        out.head(nodes_x_ - k) += weights_[k] * values.row(row).tail(nodes_x_ - k);
+        out.tail(nodes_x_ - k) += weights_[k] * values.row(row).head(nodes_x_ - k);
+      }
+    }
+    product = rows_done_;
+    for (Index k = 1; k <= std::min(radius, nodes_y_ - 1); ++k) {
+      product.topRows(nodes_y_ - k) += weights_[k] * rows_done_.bottomRows(nodes_y_ - k);
+      product.bottomRows(nodes_y_ - k) += weights_[k] * rows_done_.topRows(nodes_y_ - k);
+    }
+  }
+
+  void scatter(const Silhouette& silhouette, const Eigen::ArrayXd& values) {
+    values_.setZero();
+    for (std::size_t k = 0; k < silhouette.nodes.size(); ++k) {
+      values_.data()[silhouette.nodes[k]] = values[static_cast<Index>(k)];
+    }
+  }
+
+  /// Kernel times what `at` has on its nodes, for the nodes of `asked`. The floor keeps what is far apart from
+  /// becoming 0 / 0.
+  const Eigen::ArrayXd& spread_scale(const Silhouette& at, const Eigen::ArrayXd& scale, const Silhouette& asked) {
+    scatter(at, scale);
+    convolve(values_, product_);
+    gather(product_, asked.nodes, gathered_);
+    gathered_ += kernel_floor * scale.sum();
+    return gathered_;
+  }
 
   /// Exponent of the scaling steps: mass that stays unmatched costs reach^2 per unit.
   double stiffness() const noexcept {
     const double reach_squared = settings_.reach_px * settings_.reach_px;
-    return reach_squared / (reach_squared + entropy());
+    return reach_squared / (reach_squared + blur_ * blur_);
   }
 
-  /// exp(-|x_i - y_j|^2 / entropy), with a floor that keeps what is far apart from becoming 0 / 0.
-  void fill_kernel(const Cells& rows, const Cells& columns, Threads threads) {
-    kernel_.resize(rows.size(), columns.size());
-    const double rate = -1 / entropy();
-    parallel_ranges(columns.size(), threads, 1, [&](Index begin, Index end) {
-      for (Index j = begin; j < end; ++j) {
-        kernel_.col(j) =
-            (rate * ((rows.x - columns.x[j]).square() + (rows.y - columns.y[j]).square())).exp() + kernel_floor;
-      }
-    });
-  }
-
-  // A scale per cell of each side such that the plan u K v has the cells' masses, as far as reach allows.
-  void find_scales(Threads threads) {
-    fill_kernel(from_, to_, threads);
-    u_.setOnes(from_.size());
-    v_.setOnes(to_.size());
+  // A scale per node of each side such that the plan u K v has the nodes' masses, as far as reach allows.
+  void find_scales() {
     const double power = stiffness();
     for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
-      product_.noalias() = kernel_.matrix() * v_.matrix();
-      u_ = (from_.mass / product_.array()).pow(power);
-      product_.noalias() = kernel_.matrix().transpose() * u_.matrix();
-      v_ = (to_.mass / product_.array()).pow(power);
+      from_.scale = (from_.mass / spread_scale(to_, to_.scale, from_)).pow(power);
+      to_.scale = (to_.mass / spread_scale(from_, from_.scale, to_)).pow(power);
     }
-    to_.log_scale = v_.log();
   }
 
-  void find_debiasing_scales(Threads threads) {
-    fill_kernel(from_, from_, threads);
-    u_.setOnes(from_.size());
+  void find_debiasing_scales() {
+    from_.scale.setOnes();
     const double power = stiffness();
     for (int iteration = 0; iteration < settings_.debias_iterations; ++iteration) {
-      product_.noalias() = kernel_.matrix() * u_.matrix();
       // the symmetric problem has one scale; half steps in the logarithm converge where full ones swing
-      u_ = (u_ * (from_.mass / product_.array()).pow(power)).sqrt();
+      from_.scale = (from_.scale * (from_.mass / spread_scale(from_, from_.scale, from_)).pow(power)).sqrt();
     }
-    from_.log_scale = u_.log();
   }
 
-  /// What a point at p is matched with: the softmax of -|p - y|^2 / entropy + log scale.
-  struct Match {
-    Eigen::Vector2d place;  ///< mean [px]
-    double log_total;       ///< logarithm of what the softmax is over
-  };
-  Match match_of(const Cells& cells, const Eigen::Vector2d& p, Eigen::ArrayXd& exponent) const noexcept {
-    exponent = cells.log_scale - ((cells.x - p.x()).square() + (cells.y - p.y()).square()) / entropy();
-    const double largest = exponent.maxCoeff();
-    exponent = (exponent - largest).exp();
-    const double total = exponent.sum();
-    return {{(exponent * cells.x).sum() / total, (exponent * cells.y).sum() / total}, largest + std::log(total)};
+  /// What each node is matched with: the mean place by the weights K scale, and their sum. The sum stays in product_,
+  /// what the places are multiplied with in x and y.
+  void add_matches(const Silhouette& silhouette, double sign, Grid& total) {
+    const auto moment = [&](Index axis, Grid& shift) {
+      moments_.resize(silhouette.scale.size());
+      for (std::size_t k = 0; k < silhouette.nodes.size(); ++k) {
+        const Index node = silhouette.nodes[k];
+        const Index place = axis == 0 ? node % nodes_x_ : node / nodes_x_;
+        moments_[static_cast<Index>(k)] = silhouette.scale[static_cast<Index>(k)] * static_cast<double>(place);
+      }
+      scatter(silhouette, moments_);
+      convolve(values_, product_);
+      shift = (total > smallest_total).select(shift + sign * spacing_ * product_ / total, shift);
+    };
+    scatter(silhouette, silhouette.scale);
+    convolve(values_, product_);
+    total = product_;
+    moment(0, shift_x_);
+    moment(1, shift_y_);
   }
 
-  /// How far what is at p has to go. Of a point whose match is at distance D, exp(-(D / reach)^2) is matched at all:
+  /// How far what is at a node has to go. Of what has its match at distance D, exp(-(D / reach)^2) is matched at all:
   /// what is so far that less than 1 / e would be, is left where it is by and by.
-  Eigen::Vector2d displacement_at(const Eigen::Vector2d& p, Eigen::ArrayXd& exponent) const noexcept {
-    const Match target = match_of(to_, p, exponent), self = match_of(from_, p, exponent);
-    const double full_cell = from_.side * from_.side;
-    const double log_matched = (1 - stiffness()) * (target.log_total - std::log(full_cell));
-    return std::min(1.0, std::exp(1 + log_matched)) * (target.place - self.place);
-  }
-
-  /// The displacement on a grid around the prediction, to be interpolated.
-  void tabulate(Threads threads) {
-    node_spacing_ = std::max(from_.side, 1.0);
-    origin_ = {from_.x.minCoeff() - margin_nodes * node_spacing_, from_.y.minCoeff() - margin_nodes * node_spacing_};
-    nodes_x_ = static_cast<int>((from_.x.maxCoeff() - origin_.x()) / node_spacing_) + 1 + margin_nodes + 1;
-    nodes_y_ = static_cast<int>((from_.y.maxCoeff() - origin_.y()) / node_spacing_) + 1 + margin_nodes + 1;
-    nodes_.assign(static_cast<std::size_t>(nodes_x_) * static_cast<std::size_t>(nodes_y_), Node{});
-    for (Index cell = 0; cell < from_.size(); ++cell) {
-      const int column = static_cast<int>((from_.x[cell] - origin_.x()) / node_spacing_);
-      const int row = static_cast<int>((from_.y[cell] - origin_.y()) / node_spacing_);
-      for (int y = std::max(row - 1, 0); y <= std::min(row + 2, nodes_y_ - 1); ++y) {
-        for (int x = std::max(column - 1, 0); x <= std::min(column + 2, nodes_x_ - 1); ++x) {
-          nodes_[static_cast<std::size_t>(y * nodes_x_ + x)].valid = true;
-        }
-      }
+  void find_displacements() {
+    shift_x_.setZero();
+    shift_y_.setZero();
+    add_matches(from_, -1, total_self_);
+    add_matches(to_, 1, total_);
+    const double full_cell = spacing_ * spacing_;
+    const Grid matched = (std::exp(1.0) * (total_ / full_cell).pow(1 - stiffness())).min(1.0);
+    const auto known = total_ > smallest_total && total_self_ > smallest_total;
+    shift_x_ = known.select(matched * shift_x_, 0);
+    shift_y_ = known.select(matched * shift_y_, 0);
+    near_prediction_.setConstant(nodes_y_, nodes_x_, false);
+    for (const Index node : from_.nodes) {
+      const Index row = node / nodes_x_, column = node % nodes_x_;
+      near_prediction_
+          .block(std::max<Index>(row - 1, 0), std::max<Index>(column - 1, 0), row == 0 || row == nodes_y_ - 1 ? 2 : 3,
+                 column == 0 || column == nodes_x_ - 1 ? 2 : 3)
+          .setConstant(true);
     }
-    parallel_ranges(nodes_y_, threads, 1, [&](Index begin, Index end) {
-      Eigen::ArrayXd exponent;
-      for (Index row = begin; row < end; ++row) {
-        for (int column = 0; column < nodes_x_; ++column) {
-          Node& node = nodes_[static_cast<std::size_t>(row * nodes_x_ + column)];
-          if (node.valid) {
-            const Eigen::Vector2d p = origin_ + node_spacing_ * Eigen::Vector2d(column, static_cast<double>(row));
-            node.displacement = displacement_at(p, exponent);
-          }
-        }
-      }
-    });
   }
 
   static constexpr double kernel_floor = 1e-20;
-  static constexpr int margin_nodes = 2;
+  static constexpr double smallest_total = 1e-280;  ///< less is nothing: no silhouette within the kernel's radius
+  static constexpr Index margin_nodes = 2;
 
   Settings settings_;
-  Cells from_{}, to_{};
-  std::vector<Eigen::Array3d> sums_{};
-  Eigen::ArrayXXd kernel_{};
-  Eigen::ArrayXd u_{}, v_{};
-  Eigen::VectorXd product_{};
+  Silhouette from_{}, to_{};
+  Eigen::ArrayXd weights_{}, gathered_{}, moments_{};
+  Grid values_{}, rows_done_{}, product_{}, total_{}, total_self_{}, shift_x_{}, shift_y_{};
+  Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> near_prediction_{};
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
-  double node_spacing_ = 1;
-  int nodes_x_ = 0, nodes_y_ = 0;
-  std::vector<Node> nodes_{};
+  double spacing_ = 1, blur_ = 1;
+  Index nodes_x_ = 0, nodes_y_ = 0;
 };
 
 }  // namespace decant

@@ -3,6 +3,7 @@
 
 /// What a frame's cameras saw of the liquid, beside what the simulation says they should have seen.
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 
@@ -22,12 +23,13 @@ struct SilhouetteView {
   const Mask* predicted = nullptr;                  ///< liquid by the simulation as it is now
   const Image<float>* coverage = nullptr;           ///< how many particles cover each pixel
   std::span<const std::uint8_t> hidden{};           ///< N, 1 for particles that a body hides from this camera
+  std::size_t number = 0;                           ///< of the camera, the same in every frame
 
   const PosedCamera<CameraType>& camera() const noexcept { return sight->camera(); }
 };
 
 /// The observation of correctors that go by silhouettes. Views are those of the cameras that have something to say in
-/// this frame: no mask, no view.
+/// this frame: no mask, or one that is not to be believed (MaskTrust), no view.
 template <class CameraType>
 struct Silhouettes {
   using Camera = CameraType;

@@ -30,7 +30,6 @@ struct TransportCorrectorSettings {
   double velocity_gate_px = 2;  ///< shorter moves leave velocities alone, >= 0
   double longest_move = 0.008;  ///< per pass [m], > 0
   double fastest = 4;           ///< corrected velocities stay below [m/s], > 0
-  int least_pixels = 150;       ///< of liquid that a mask must show to be trusted, >= 1
 };
 
 /// Transport of the predicted silhouette to the observed one (SilhouetteTransport), as a move of each particle that a
@@ -54,7 +53,6 @@ class TransportCorrector {
     expects(settings.velocity_gate_px >= 0, "TransportCorrector: velocity_gate_px", ">= 0", settings.velocity_gate_px);
     expects(settings.longest_move > 0, "TransportCorrector: longest_move [m]", "> 0", settings.longest_move);
     expects(settings.fastest > 0, "TransportCorrector: fastest [m/s]", "> 0", settings.fastest);
-    expects(settings.least_pixels >= 1, "TransportCorrector: least_pixels", ">= 1", settings.least_pixels);
     for (const TransportPass& pass : settings.passes) {
       expects(pass.velocity_share >= 0 && pass.velocity_share <= 1, "TransportCorrector: velocity_share", "0 .. 1",
               pass.velocity_share);
@@ -74,8 +72,7 @@ class TransportCorrector {
     normal_.assign(static_cast<std::size_t>(fluid.size()), Normal{});
     bool any = false;
     for (const SilhouetteView<CameraType>& view : seen.views) {
-      const Index pixels = (*view.observed >= 128).count();
-      if (pixels >= settings_.least_pixels && transports_[pass].match(*view.predicted, *view.observed, seen.threads)) {
+      if (transports_[pass].match(*view.predicted, *view.observed)) {
         any = true;
         gather(fluid, view, transports_[pass], seen.threads);
       }

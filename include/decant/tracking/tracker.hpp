@@ -26,6 +26,7 @@
 #include <decant/projector/silhouette.hpp>
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/liquid_model.hpp>
+#include <decant/tracking/mask_trust.hpp>
 #include <decant/tracking/overlap.hpp>
 
 namespace decant {
@@ -36,6 +37,7 @@ struct TrackerSettings {
   int gap_closing_px = 4;               ///< gaps in the drawn silhouette up to this are closed, 0 .. 64
   int cleaning_window_px = 3;           ///< of MaskCleaning; 1 takes masks as they come
   int smallest_region_px = 10;          ///< likewise
+  int least_pixels = 150;               ///< of liquid in a mask that is believed in any case: see MaskTrust; >= 1
   double occlusion_margin = 1e-3;       ///< see RayOcclusion [m]
   int relaxation_sweeps = 4;            ///< after each correction, what is too dense moves apart; >= 0
   double longest_path_in_spacings = 5;  ///< longer moves are mass taken from place to place, not paths; > 0
@@ -67,7 +69,7 @@ struct TrackerFrame {
 
 enum class FrameStatus {
   ok,
-  uncorrected,   ///< time went on, but there was no mask that could be used
+  uncorrected,   ///< time went on, but there was no mask that could be believed
   late,          ///< the frame is not newer than the one before: nothing was done
   gap,           ///< the frame is later than longest_gap, or its time is not finite: nothing was done
   bad_input,     ///< a body or camera that does not exist, a pose that is none, or a mask of another size: nothing was
@@ -137,6 +139,7 @@ class Tracker {
         likelihood_(settings.likelihood) {
     expects(settings.sphere_in_spacings > 0 && settings.sphere_in_spacings < 100, "Tracker: sphere_in_spacings",
             "> 0 and < 100", settings.sphere_in_spacings);
+    expects(settings.least_pixels >= 1, "Tracker: least_pixels", ">= 1", settings.least_pixels);
     expects(settings.relaxation_sweeps >= 0, "Tracker: relaxation_sweeps", ">= 0", settings.relaxation_sweeps);
     expects(settings.longest_path_in_spacings > 0, "Tracker: longest_path_in_spacings", "> 0",
             settings.longest_path_in_spacings);
@@ -204,6 +207,9 @@ class Tracker {
   /// Forgets earlier frames' observations; the model stays as it is.
   void reset() noexcept {
     corrector_.reset();
+    for (Eye& eye : eyes_) {
+      eye.trust.reset();
+    }
     started_ = false;
   }
 
@@ -249,15 +255,17 @@ class Tracker {
     RayOcclusion<Camera> occlusion;
     Silhouette<DiscSplat<Scalar>> silhouette;
     MaskCleaning cleaning;
+    MaskTrust trust;
     Mask observed, predicted;
     std::vector<std::uint8_t> hidden{};
-    bool has_mask = false;
+    bool has_mask = false, believed = false;
 
     Eye(const Camera& camera, const Pose& camera_from_world, const Settings& settings, const Model& model)
         : occlusion(PosedCamera<Camera>(camera, camera_from_world), settings.occlusion_margin),
           silhouette(DiscSplat<Scalar>(settings.sphere_in_spacings * model.spacing()),
                      GapClosing(settings.gap_closing_px)),
           cleaning(settings.cleaning_window_px, settings.smallest_region_px),
+          trust(settings.least_pixels),
           observed(Mask::Zero(camera.height(), camera.width())),
           predicted(observed) {
       occlusion.add_bodies(model.bodies(), model.time());
@@ -280,18 +288,21 @@ class Tracker {
   void look(const TrackerFrame& frame, FrameReport& report) noexcept {
     const Stopwatch drawing(report.drawing_ms);
     for (Eye& eye : eyes_) {
-      eye.has_mask = false;
+      eye.has_mask = eye.believed = false;
     }
     for (const CameraMask& mask : frame.masks) {
       Eye& eye = eyes_[mask.camera];
       eye.cleaning.apply(mask.mask, eye.observed, settings_.threads);
       eye.has_mask = true;
+      eye.believed = eye.trust.believes(eye.observed);
     }
     views_.clear();
-    for (Eye& eye : eyes_) {
+    for (std::size_t camera = 0; camera < eyes_.size(); ++camera) {
+      Eye& eye = eyes_[camera];
       draw(model_, eye, eye.predicted);
-      if (eye.has_mask) {
-        views_.push_back({&eye.occlusion, &eye.observed, &eye.predicted, &eye.silhouette.coverage(), eye.hidden});
+      if (eye.believed) {
+        views_.push_back(
+            {&eye.occlusion, &eye.observed, &eye.predicted, &eye.silhouette.coverage(), eye.hidden, camera});
       }
     }
   }
@@ -331,10 +342,8 @@ class Tracker {
       CorrectionReport moves;
       {
         const Stopwatch correction(report.correction_ms);
-        for (std::size_t k = 0, next = 0; k < eyes_.size(); ++k) {
-          if (eyes_[k].has_mask) {
-            views_[next++].hidden = eyes_[k].hidden;
-          }
+        for (SilhouetteView<Camera>& view : views_) {
+          view.hidden = eyes_[view.number].hidden;
         }
         moves = corrector_.correct(fluid, {views_, pass, model_.spacing(), settings_.gravity, settings_.threads},
                                    static_cast<Scalar>(duration));

@@ -20,7 +20,7 @@
 namespace decant {
 
 /// Settings of WarpFieldSchenck2017.
-struct WarpFieldSettings {
+struct WarpFieldSchenck2017Settings {
   double strength = 0.1;           ///< lambda [1/s^2]: acceleration over the sum, taken back to metres; >= 0
   ImageKernel kernel{};            ///< of the sum
   double support_in_spacings = 2;  ///< of the smoothing over the particles, >= 1
@@ -39,7 +39,7 @@ class WarpFieldSchenck2017 {
  public:
   using Scalar = ScalarType;
   using Observation = Silhouettes<CameraType>;
-  using Settings = WarpFieldSettings;
+  using Settings = WarpFieldSchenck2017Settings;
 
   WarpFieldSchenck2017() : WarpFieldSchenck2017(Settings{}) {}
 
