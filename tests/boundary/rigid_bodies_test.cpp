@@ -26,7 +26,7 @@ Pose at(const Vector3<double>& x, double angle = 0, const Vector3<double>& axis 
 }
 
 template <class Bodies>
-BodyId add(Bodies& bodies, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
+BodyId add(Bodies& bodies, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::Free) {
   using Scalar = typename Bodies::Scalar;
   return bodies.template add<CubicSpline<Scalar>>("body", std::move(shape), std::move(motion), slip, spacing, spacing,
                                                   Threads{1});
@@ -74,7 +74,7 @@ TEMPLATE_TEST_CASE("rigid bodies: a step's velocity is that of the poses", "", f
 TEMPLATE_TEST_CASE("rigid bodies: walls fill up what the kernel misses and point into the wall", "", float, double) {
   RigidBodies<TestType> bodies;
   const Pose pose = at({0.3, 0.2, 0.1}, 0.7, {1, 2, 3});
-  const BodyId body = add(bodies, Box{{-0.1, -0.1, -0.05}, {0.1, 0.1, 0}}, PoseTrack(pose), Slip::none);
+  const BodyId body = add(bodies, Box{{-0.1, -0.1, -0.05}, {0.1, 0.1, 0}}, PoseTrack(pose), Slip::None);
   bodies.set_interval(0, 0.01);
   // a wall reaches one spacing far (boundary/wall_function.hpp)
   const std::vector<double> heights{0.0005, 0.001, 0.0025, 0.004, 0.006};

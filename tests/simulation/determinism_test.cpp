@@ -40,7 +40,7 @@ Simulator<Parts> splash(int threads, int per_side = 10) {
   }
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, 0.0601, 0.12}, 0.002, {}}, PoseTrack(rocking));
   simulator.add_body("post", TriangleMesh(Cylinder{0.006, 0.05}.mesh()),
-                     PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.066, 0.03, 0.035}}), Slip::none);
+                     PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.066, 0.03, 0.035}}), Slip::None);
   PointArray<Scalar> x(3, per_side * per_side * per_side);
   Index n = 0;
   for (int i = 0; i < per_side; ++i) {

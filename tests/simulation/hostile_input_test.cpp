@@ -239,18 +239,18 @@ TEMPLATE_TEST_CASE("hostile: frame times out of range change nothing", "", float
   const double time = simulator.time();
   for (const double frame : {-0.01, not_a_number, unbounded, -unbounded}) {
     const StepReport report = simulator.step(frame);
-    CHECK(report.status == StepStatus::bad_time_step);
+    CHECK(report.status == StepStatus::BadTimeStep);
     CHECK_FALSE(report.advanced());
     CHECK(same_bits(simulator.fluid(), before));
     CHECK(simulator.time() == time);
   }
   const StepReport still = simulator.step(0);
-  CHECK(still.status == StepStatus::ok);
+  CHECK(still.status == StepStatus::Ok);
   CHECK(still.sub_steps == 0);
   CHECK(still.particles == before.size());
   CHECK(same_bits(simulator.fluid(), before));
   CHECK(simulator.step(1e-12).advanced());
-  CHECK(simulator.step(1e6).status == StepStatus::too_many_steps);
+  CHECK(simulator.step(1e6).status == StepStatus::TooManySteps);
 }
 
 TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the frame and stays as it was", "", float,
@@ -276,7 +276,7 @@ TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the
           CHECK((report.advanced() ? simulator.fluid().position.allFinite() && simulator.fluid().velocity.allFinite()
                                    : same_bits(simulator.fluid(), before)));
         } else {
-          CHECK(report.status == StepStatus::non_finite);
+          CHECK(report.status == StepStatus::NonFinite);
           CHECK(same_bits(simulator.fluid(), before));
           CHECK(simulator.time() == time);
         }
@@ -341,7 +341,7 @@ TEMPLATE_TEST_CASE("hostile: no particle and one particle", "", float, double) {
   Simulator<DefaultParts<TestType>> simulator(coarse());
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
   const StepReport empty = simulator.step(0.1);
-  CHECK(empty.status == StepStatus::ok);
+  CHECK(empty.status == StepStatus::Ok);
   CHECK(empty.particles == 0);
   CHECK(empty.volume == 0);
   CHECK(simulator.time() == Approx(0.1));
@@ -358,7 +358,7 @@ TEMPLATE_TEST_CASE("hostile: no particle and one particle", "", float, double) {
   check_in_box(simulator);
   CHECK(simulator.fluid().position(2, 0) < TestType(0.01));
   CHECK(simulator.remove_particles_if([](Index) { return true; }) == 1);
-  CHECK(simulator.step(0.02).status == StepStatus::ok);
+  CHECK(simulator.step(0.02).status == StepStatus::Ok);
 }
 
 TEST_CASE("hostile: a body that is put into the liquid pushes it out and loses none") {
@@ -419,7 +419,7 @@ TEST_CASE("hostile: a pose that jumps by a metre is refused with a status or car
       }
       CHECK(report.lost == 0);
     } else {
-      CHECK(report.status == StepStatus::too_many_steps);
+      CHECK(report.status == StepStatus::TooManySteps);
       CHECK(same_bits(simulator.fluid(), before));
       CHECK(simulator.time() == time);
     }
@@ -479,7 +479,7 @@ TEST_CASE("hostile: a flow beyond reason is stopped by a status") {
   inlet.flow = {{0, 10}, {1, 10}};  // 30 km/s
   simulator.add_inlet(inlet, 0);
   const StepReport report = simulator.step(0.02);
-  CHECK(report.status == StepStatus::too_many_steps);
+  CHECK(report.status == StepStatus::TooManySteps);
   CHECK(simulator.fluid().size() == 0);
   CHECK(simulator.time() == 0);
 }

@@ -78,11 +78,11 @@ TEMPLATE_TEST_CASE("simulator: a frame takes its time and reports what there is"
 }
 
 TEST_CASE("simulator: a status has a name") {
-  CHECK(std::string(to_string(StepStatus::ok)) == "ok");
-  CHECK(std::string(to_string(StepStatus::not_converged)) == "not converged");
-  CHECK(std::string(to_string(StepStatus::bad_time_step)) == "bad time step");
-  CHECK(std::string(to_string(StepStatus::too_many_steps)) == "too many sub-steps");
-  CHECK(std::string(to_string(StepStatus::non_finite)) == "non-finite");
+  CHECK(std::string(to_string(StepStatus::Ok)) == "ok");
+  CHECK(std::string(to_string(StepStatus::NotConverged)) == "not converged");
+  CHECK(std::string(to_string(StepStatus::BadTimeStep)) == "bad time step");
+  CHECK(std::string(to_string(StepStatus::TooManySteps)) == "too many sub-steps");
+  CHECK(std::string(to_string(StepStatus::NonFinite)) == "non-finite");
   CHECK(std::string(to_string(static_cast<StepStatus>(99))) == "unknown");
 }
 

@@ -22,8 +22,8 @@ using BodyId = std::uint32_t;
 
 /// How liquid moves along a wall.
 enum class Slip {
-  free,  ///< without friction: right where the boundary layer is thinner than a particle
-  none,  ///< the liquid at the wall moves with it, pulled by its viscosity
+  Free,  ///< without friction: right where the boundary layer is thinner than a particle
+  None,  ///< the liquid at the wall moves with it, pulled by its viscosity
 };
 
 /// What guarding a step took.

@@ -92,8 +92,8 @@ class MassRelocation {
     if (observed_px < settings_.least_pixels) {
       return 0;
     }
-    to_observed_.rebuild(*view.observed, MaskPart::liquid, seen.threads);
-    to_predicted_.rebuild(*view.predicted, MaskPart::liquid, seen.threads);
+    to_observed_.rebuild(*view.observed, MaskPart::Liquid, seen.threads);
+    to_predicted_.rebuild(*view.predicted, MaskPart::Liquid, seen.threads);
     find_wanted(view, unexplained_before);
     sort_particles(fluid, seen, view);
 
