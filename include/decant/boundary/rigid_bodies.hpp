@@ -192,16 +192,16 @@ class RigidBodies {
   }
 
   /// Bends the steps of particles that would cross a wall or come nearer to it than `clearance` [m]. Particles go from
-  /// `before` to `after` (3xN [m], changed) in time_step [s] while the bodies move through the interval; velocities of
-  /// bent steps become what the step was. `walls` is as sampled at `before`.
-  GuardReport guard(const ConstPointsView<Scalar>& before, double time_step, double clearance, Threads threads,
+  /// `before` (3xN [m]) to fluid.position (changed) while the bodies move through the interval; those that were bent
+  /// lose the part of their velocity that points into the wall. `walls` is as sampled at `before`.
+  GuardReport guard(const ConstPointsView<Scalar>& before, double clearance, Threads threads,
                     const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     if (bodies_.empty()) {
       return {};
     }
     std::atomic<Index> slid{0}, stopped{0}, lost{0};
     parallel_for(before.cols(), threads, [&](Index i) {
-      switch (guard_particle(i, before, time_step, clearance, walls, fluid)) {
+      switch (guard_particle(i, before, clearance, walls, fluid)) {
         case Outcome::Free:
           break;
         case Outcome::Slid:
@@ -335,7 +335,7 @@ class RigidBodies {
     walls.contact_count[i] = static_cast<std::uint8_t>(count);
   }
 
-  Outcome guard_particle(Index i, const ConstPointsView<Scalar>& before, double time_step, double clearance,
+  Outcome guard_particle(Index i, const ConstPointsView<Scalar>& before, double clearance,
                          const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     const Vector3<double> x0 = before.col(i).template cast<double>();
     Vector3<double> x1 = fluid.position.col(i).template cast<double>();
@@ -391,7 +391,6 @@ class RigidBodies {
       }
       fluid.position.col(i) = x1.template cast<Scalar>();
     }
-    (void)time_step;
     return outcome;
   }
 

@@ -581,8 +581,7 @@ class Simulator {
     const Scalar dt = static_cast<Scalar>(time_step);
     parallel_for(fluid_.size(), settings_.threads,
                  [&](Index i) { fluid_.position.col(i) += dt * fluid_.velocity.col(i) + shift_.col(i); });
-    const GuardReport guard =
-        bodies_.guard(before_, time_step, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    const GuardReport guard = bodies_.guard(before_, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
     report.guarded += guard.slid + guard.stopped;
     report.lost += guard.lost;
     if constexpr (Domain::periodic) {
@@ -593,7 +592,7 @@ class Simulator {
 
   /// The guard for moves that are not motion: from before_, at walls that stand.
   Index keep_on_sides() noexcept {
-    const GuardReport guard = bodies_.guard(before_, 0, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    const GuardReport guard = bodies_.guard(before_, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
     return guard.slid + guard.stopped + guard.lost;
   }
 
