@@ -17,20 +17,18 @@
 #include <decant/simulation/fill.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
 namespace {
 
+using decant_test::block;
+
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
-SimulatorSettings coarse() {
-  SimulatorSettings settings;
-  settings.spacing = 0.008;
-  settings.threads = {1};
-  return settings;
-}
+SimulatorSettings coarse() { return decant_test::with_spacing(0.008); }
 
 // The one line that a set-up error says; empty if nothing was thrown.
 std::string refusal(const std::function<void()>& call) {
@@ -45,26 +43,12 @@ std::string refusal(const std::function<void()>& call) {
   return {};
 }
 
-template <class Scalar>
-PointArray<Scalar> block(int per_side, double spacing, const Vector3<double>& corner = Vector3<double>::Zero()) {
-  PointArray<Scalar> x(3, per_side * per_side * per_side);
-  Index n = 0;
-  for (int i = 0; i < per_side; ++i) {
-    for (int j = 0; j < per_side; ++j) {
-      for (int k = 0; k < per_side; ++k) {
-        x.col(n++) = (corner + spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
-  return x;
-}
-
 // A small open box, half full, that has run a little.
 template <class Scalar>
 Simulator<DefaultParts<Scalar>> half_full_box() {
   Simulator<DefaultParts<Scalar>> simulator(coarse());
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
-  const auto x = block<Scalar>(6, 0.008);
+  const auto x = block<Scalar>(6, 6, 6, 0.008);
   simulator.add_particles(x, PointArray<Scalar>::Zero(3, x.cols()), 0);
   REQUIRE(simulator.step(0.05).advanced());
   return simulator;
@@ -222,7 +206,7 @@ TEST_CASE("hostile: an inverted mesh holds liquid all the same") {
   }
   LiquidSimulator simulator(coarse());
   const BodyId body = simulator.add_body("inverted", mesh);
-  const auto x = block<float>(4, 0.008, {-0.016, -0.016, 0.001});
+  const auto x = block<float>(4, 4, 4, 0.008, {-0.016, -0.016, 0.001});
   simulator.add_particles(x, PointArray<float>::Zero(3, x.cols()), body);
   for (int k = 0; k < 20; ++k) {
     REQUIRE(simulator.step(0.02).advanced());
@@ -263,7 +247,7 @@ TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the
         settings.fixed_step = fixed;
         Simulator<DefaultParts<TestType>> simulator(settings);
         simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
-        const auto x = block<TestType>(5, 0.008);
+        const auto x = block<TestType>(5, 5, 5, 0.008);
         simulator.add_particles(x, PointArray<TestType>::Zero(3, x.cols()), 0);
         REQUIRE(simulator.step(0.01).advanced());
         const auto good = simulator.snapshot();

@@ -15,31 +15,14 @@
 #include <decant/simulation/fill.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
 namespace {
 
-SimulatorSettings with_spacing(double spacing) {
-  SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {1};
-  return settings;
-}
-
-template <class Scalar>
-PointArray<Scalar> block(int nx, int ny, int nz, double spacing) {
-  PointArray<Scalar> x(3, nx * ny * nz);
-  Index n = 0;
-  for (int i = 0; i < nx; ++i) {
-    for (int j = 0; j < ny; ++j) {
-      for (int k = 0; k < nz; ++k) {
-        x.col(n++) = (spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
-  return x;
-}
+using decant_test::block;
+using decant_test::with_spacing;
 
 template <class Scalar>
 Simulator<DefaultParts<Scalar>> box_of_liquid() {
