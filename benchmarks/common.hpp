@@ -71,8 +71,8 @@ inline std::string compiler() {
 inline std::string flags() {
   using decant::detail::vector_unit;
   using decant::detail::VectorUnit;
-  std::string text = vector_unit == VectorUnit::avx512 ? "AVX-512"
-                     : vector_unit == VectorUnit::avx2 ? "AVX2"
+  std::string text = vector_unit == VectorUnit::Avx512 ? "AVX-512"
+                     : vector_unit == VectorUnit::Avx2 ? "AVX2"
                                                        : "baseline";
 #if !defined(__OPTIMIZE__)
   text += " not optimised";

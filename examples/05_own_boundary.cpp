@@ -60,7 +60,7 @@ struct Flask {
     });
   }
 
-  decant::GuardReport guard(const decant::ConstPointsView<float>&, double, double clearance, decant::Threads,
+  decant::GuardReport guard(const decant::ConstPointsView<float>&, double clearance, decant::Threads,
                             const decant::WallState<float>&, decant::FluidState<float>& fluid) const noexcept {
     decant::GuardReport report;
     for (decant::Index i = 0; i < fluid.size(); ++i) {

@@ -100,9 +100,9 @@ void run(Csv& csv, Frames& frames, Threads threads) {
   row("mask cleaning: 3 x 3 vote and regions below 10 px",
       time_of([&] { cleaning.apply(frames.raw[frames.next()], mask, threads); }), "1 % salt");
   SilhouetteDistance distance;
-  row("distance transform", time_of([&] { distance.rebuild(frames.mask[frames.next()], MaskPart::liquid, threads); }),
+  row("distance transform", time_of([&] { distance.rebuild(frames.mask[frames.next()], MaskPart::Liquid, threads); }),
       "silhouette of the liquid");
-  row("distance transform", time_of([&] { distance.rebuild(frames.raw[frames.next()], MaskPart::liquid, threads); }),
+  row("distance transform", time_of([&] { distance.rebuild(frames.raw[frames.next()], MaskPart::Liquid, threads); }),
       "1 % salt");
 
   ActivationField activation_field(width, height);

@@ -293,7 +293,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   settings.gravity += hidden.pull;
   settings.liquid.dynamic_viscosity = hidden.kinematic_viscosity * settings.liquid.density;
   Simulator<Parts> reality(settings);
-  const Slip slip = hidden.sticky_walls ? Slip::none : Slip::free;
+  const Slip slip = hidden.sticky_walls ? Slip::None : Slip::Free;
   const BodyId cup = reality.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)), slip);
   const BodyId pan = reality.add_body("pan", pour_pan());
   constexpr bool foreign = !std::is_same_v<Parts, DefaultParts<float>>;

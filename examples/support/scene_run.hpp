@@ -139,7 +139,7 @@ class SceneRun {
     const auto begin = Clock::now();
     set_solver();
     for (const decant::scene::Body& body : scene.bodies) {
-      const auto slip = body.slip == decant::scene::Slip::None ? decant::Slip::none : decant::Slip::free;
+      const auto slip = body.slip == decant::scene::Slip::None ? decant::Slip::None : decant::Slip::Free;
       const decant::BodyId added = simulator_.add_body(body.name, shape_of(body, scene.spacing), body.motion, slip);
       if (std::holds_alternative<decant::scene::Mesh>(body.shape)) {
         for (const std::string& warning : simulator_.mesh_report(added).warnings) {
@@ -176,7 +176,7 @@ class SceneRun {
       result_.sub_steps += report.sub_steps;
       result_.iterations += report.density_iterations + report.divergence_iterations;
       result_.density_error_max = std::max(result_.density_error_max, report.density_error);
-      result_.unconverged_frames += report.status == decant::StepStatus::not_converged ? 1 : 0;
+      result_.unconverged_frames += report.status == decant::StepStatus::NotConverged ? 1 : 0;
       result_.lost = static_cast<long>(report.lost + report.non_finite);
       if (!report.advanced()) {
         result_.status = std::string(to_string(report.status)) + " in the frame that ends at " +

@@ -42,7 +42,7 @@ void check_laws(const BodyShape& shape) {
   using Scalar = typename Bodies::Scalar;
   using Kernel = CubicSpline<Scalar>;
   Bodies bodies;
-  bodies.template add<Kernel>("vessel", shape, {}, Slip::free, d, d, {1});
+  bodies.template add<Kernel>("vessel", shape, {}, Slip::Free, d, d, {1});
   // farther than the vessel is wide: to the other side of any wall
   for (const testing::Law& law : testing::boundary_laws<Kernel>(bodies, places<Scalar>(), d, 0.3)) {
     INFO(law.text());

@@ -26,7 +26,7 @@ Pose at(const Vector3<double>& x, double angle = 0, const Vector3<double>& axis 
 }
 
 template <class Bodies>
-BodyId add(Bodies& bodies, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
+BodyId add(Bodies& bodies, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::Free) {
   using Scalar = typename Bodies::Scalar;
   return bodies.template add<CubicSpline<Scalar>>("body", std::move(shape), std::move(motion), slip, spacing, spacing,
                                                   Threads{1});
@@ -74,7 +74,7 @@ TEMPLATE_TEST_CASE("rigid bodies: a step's velocity is that of the poses", "", f
 TEMPLATE_TEST_CASE("rigid bodies: walls fill up what the kernel misses and point into the wall", "", float, double) {
   RigidBodies<TestType> bodies;
   const Pose pose = at({0.3, 0.2, 0.1}, 0.7, {1, 2, 3});
-  const BodyId body = add(bodies, Box{{-0.1, -0.1, -0.05}, {0.1, 0.1, 0}}, PoseTrack(pose), Slip::none);
+  const BodyId body = add(bodies, Box{{-0.1, -0.1, -0.05}, {0.1, 0.1, 0}}, PoseTrack(pose), Slip::None);
   bodies.set_interval(0, 0.01);
   // a wall reaches one spacing far (boundary/wall_function.hpp)
   const std::vector<double> heights{0.0005, 0.001, 0.0025, 0.004, 0.006};
@@ -207,7 +207,7 @@ TEMPLATE_TEST_CASE("rigid bodies: the guard bends paths that would cross a wall"
   WallState<TestType> walls;
   bodies.sample(before, spacing, Threads{1}, walls);
   auto with_four = fluid;
-  const GuardReport report = bodies.guard(before, step, clearance, Threads{1}, walls, fluid);
+  const GuardReport report = bodies.guard(before, clearance, Threads{1}, walls, fluid);
   CHECK(report.slid > 500);
   CHECK(report.lost == 0);
   CHECK((fluid.position.array() > 0).all());
@@ -215,7 +215,7 @@ TEMPLATE_TEST_CASE("rigid bodies: the guard bends paths that would cross a wall"
   CHECK(fluid.velocity.allFinite());
   // the wall takes speed and gives none
   CHECK(fluid.velocity.norm() <= with_four.velocity.norm());
-  const GuardReport four = bodies.guard(before, step, clearance, Threads{4}, walls, with_four);
+  const GuardReport four = bodies.guard(before, clearance, Threads{4}, walls, with_four);
   CHECK(four.slid == report.slid);
   CHECK(four.stopped == report.stopped);
   CHECK((with_four.position.array() == fluid.position.array()).all());
@@ -231,7 +231,7 @@ TEMPLATE_TEST_CASE("rigid bodies: a fast thin plate takes along what is in its w
   const PointArray<TestType> before = fluid.position;
   WallState<TestType> walls;
   bodies.sample(before, spacing, Threads{1}, walls);
-  const GuardReport report = bodies.guard(before, step, 0.0005, Threads{1}, walls, fluid);
+  const GuardReport report = bodies.guard(before, 0.0005, Threads{1}, walls, fluid);
   CHECK(report.slid == 2);
   CHECK(fluid.position(2, 0) > TestType(0.05));
   CHECK(fluid.position(2, 1) > TestType(0.05));
@@ -251,7 +251,7 @@ TEMPLATE_TEST_CASE("rigid bodies: what is squeezed between two bodies is counted
   const PointArray<TestType> before = fluid.position;
   WallState<TestType> walls;
   bodies.sample(before, spacing, Threads{1}, walls);
-  const GuardReport report = bodies.guard(before, step, 0.0005, Threads{1}, walls, fluid);
+  const GuardReport report = bodies.guard(before, 0.0005, Threads{1}, walls, fluid);
   CHECK(report.lost == 1);
   CHECK(fluid.position.allFinite());
 }
@@ -295,7 +295,7 @@ TEST_CASE("rigid bodies: no bodies are no walls") {
   bodies.sample(fluid.position, spacing, Threads{1}, walls);
   CHECK(walls.share[0] == 0);
   CHECK(walls.contact_count[0] == 0);
-  const GuardReport report = bodies.guard(before, 0.01, 0.001, Threads{1}, walls, fluid);
+  const GuardReport report = bodies.guard(before, 0.001, Threads{1}, walls, fluid);
   CHECK(report.slid + report.stopped + report.lost == 0);
 }
 

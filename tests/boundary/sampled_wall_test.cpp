@@ -160,7 +160,7 @@ TEST_CASE("SampledWall: a surface smaller than a particle still has one sample a
 
 TEST_CASE("SampledWall serves rigid bodies as MeshWall does") {
   decant::RigidBodies<float, SampledWall> bodies;
-  bodies.add<decant::CubicSpline<float>>("plate", decant::BodyShape{plate(0.03, 2)}, {}, decant::Slip::free, spacing,
+  bodies.add<decant::CubicSpline<float>>("plate", decant::BodyShape{plate(0.03, 2)}, {}, decant::Slip::Free, spacing,
                                          spacing, Threads{1});
   bodies.set_interval(0, 0);
   decant::WallState<float> walls;

@@ -28,11 +28,11 @@ TEST_CASE("swept contact slides along a wall and keeps its clearance") {
   const auto mesh = closed_box({0, 0, 0}, {0.1, 0.1, 0.1});
   const decant::BoundingVolumeHierarchy surface(mesh);
   Vector3<double> end(0.06, 0.05, -0.02);
-  CHECK(decant::keep_on_side(surface, {0.05, 0.05, 0.003}, end, 0.0005) == decant::SweptResult::slid);
+  CHECK(decant::keep_on_side(surface, {0.05, 0.05, 0.003}, end, 0.0005) == decant::SweptResult::Slid);
   CHECK(end[0] == Approx(0.06));  // what lies along the wall is kept
   CHECK(end[2] == Approx(0.0005));
   Vector3<double> free(0.055, 0.05, 0.01);
-  CHECK(decant::keep_on_side(surface, {0.05, 0.05, 0.003}, free, 0.0005) == decant::SweptResult::free);
+  CHECK(decant::keep_on_side(surface, {0.05, 0.05, 0.003}, free, 0.0005) == decant::SweptResult::Free);
   CHECK(free == Vector3<double>(0.055, 0.05, 0.01));
 }
 
@@ -48,7 +48,7 @@ TEST_CASE("no walk leaves a closed box or enters it, whatever the step") {
     int bent = 0;
     for (int k = 0; k < 20000; ++k) {
       Vector3<double> end = x + Vector3<double>(step(random), step(random), step(random));
-      bent += decant::keep_on_side(surface, x, end, 0.0005) != decant::SweptResult::free;
+      bent += decant::keep_on_side(surface, x, end, 0.0005) != decant::SweptResult::Free;
       x = end;
       REQUIRE(box.contains(x) == inside);
       if (!inside && x.norm() > 0.06) {

@@ -309,9 +309,9 @@ TEST_CASE("Affine fit: says when a map cannot be trusted") {
   // one wrong corner of a parallelogram spreads over all four alike: a quarter of it each
   CHECK(uncertain.largest_px == Approx(25));
 
-  CHECK(std::string(describe(AffineFitStatus::Good)) == "good");
-  CHECK(std::string(describe(AffineFitStatus::Unverified)) == "too few pairs to tell a wrong one");
-  CHECK(std::string(describe(AffineFitStatus::Scattered)) == "more than half of the pairs follow no common affine map");
+  CHECK(std::string(to_string(AffineFitStatus::Good)) == "good");
+  CHECK(std::string(to_string(AffineFitStatus::Unverified)) == "too few pairs to tell a wrong one");
+  CHECK(std::string(to_string(AffineFitStatus::Scattered)) == "more than half of the pairs follow no common affine map");
 }
 
 TEST_CASE("Affine fit: refuses what fixes no map") {

@@ -299,7 +299,7 @@ TEST_CASE("The bodies of a simulation are drawn where they are at the time") {
   const decant::PoseTrack passing(
       {{0.0, pose_of(0, Point::UnitX(), Point(0, 0, 0.5))}, {1.0, pose_of(0, Point::UnitX(), Point(0.2, 0, 0.5))}});
   const decant::Box box{Point(-0.05, -0.05, -0.05), Point(0.05, 0.05, 0.05)};
-  bodies.add<decant::CubicSpline<float>>("passing", box, passing, decant::Slip::free, 0.005, 0.005, {1});
+  bodies.add<decant::CubicSpline<float>>("passing", box, passing, decant::Slip::Free, 0.005, 0.005, {1});
   DepthBuffer<PinholeCamera> buffer{PosedCamera<PinholeCamera>(decant_test::pinhole)};
   buffer.draw_bodies(bodies, 0, {1});
   CHECK(buffer.depth()(61, 79) == Approx(0.45));

@@ -9,6 +9,7 @@
 
 #include "catch.hpp"
 #include "masks.hpp"
+#include "thread_check.hpp"
 
 namespace {
 
@@ -171,23 +172,7 @@ TEST_CASE("The field is continuous, never negative, and zero far away") {
   }
 }
 
-TEST_CASE("Any number of threads gives the same field") {
-  const auto mask = decant_test::masks()[13].mask;  // salt
-  const Image<float> coverage = decant_test::some_coverage(mask.rows(), mask.cols(), 3);
-  ActivationField alone(260, 240);
-  alone.rebuild(mask, coverage, Threads{1});
-  for (const int threads : {2, 4}) {
-    ActivationField field(260, 240);
-    field.rebuild(mask, coverage, Threads{threads});
-    Index different = 0;
-    for (double v = -100; v < 340; v += 2.3) {
-      for (double u = -100; u < 360; u += 2.9) {
-        different += field.value({u, v}) == alone.value({u, v}) ? 0 : 1;
-      }
-    }
-    CHECK(different == 0);
-  }
-}
+TEST_CASE("Any number of threads gives the same field") { decant_test::check_threads_agree<ActivationField>(); }
 
 TEST_CASE("Coverage that is no count does no harm") {
   Mask mask = Mask::Zero(50, 50);

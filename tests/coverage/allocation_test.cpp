@@ -32,8 +32,8 @@ TEST_CASE("allocation: none per frame in coverage") {
     decant_test::watching = frame > 1;
     const Threads threads{1 + frame % 2};
     cleaning.apply(mask, clean, threads);
-    distance.rebuild(clean, MaskPart::liquid, threads);
-    distance.rebuild(clean, MaskPart::background, threads);
+    distance.rebuild(clean, MaskPart::Liquid, threads);
+    distance.rebuild(clean, MaskPart::Background, threads);
     activation_field.rebuild(mask, coverage, threads);
     warp_field.rebuild(mask, coverage, threads);
     const double sum = activation_field.value({20.5, 30.5}) + warp_field.value({20.5, 30.5}).norm() +

@@ -20,7 +20,7 @@ Image<int> squared_distances(const Mask& mask, MaskPart part) {
       for (Index y = 0; y < mask.rows(); ++y) {
         for (Index x = 0; x < mask.cols(); ++x) {
           const int squared = static_cast<int>((u - x) * (u - x) + (v - y) * (v - y));
-          if ((mask(y, x) >= 128) == (part == MaskPart::liquid) && (result(v, u) < 0 || squared < result(v, u))) {
+          if ((mask(y, x) >= 128) == (part == MaskPart::Liquid) && (result(v, u) < 0 || squared < result(v, u))) {
             result(v, u) = squared;
           }
         }
@@ -32,7 +32,7 @@ Image<int> squared_distances(const Mask& mask, MaskPart part) {
 
 void check(const Mask& mask) {
   SilhouetteDistance transform;
-  for (const MaskPart part : {MaskPart::liquid, MaskPart::background}) {
+  for (const MaskPart part : {MaskPart::Liquid, MaskPart::Background}) {
     const Image<int> expected = squared_distances(mask, part);
     Image<std::int32_t> first;
     for (const int threads : {1, 2, 4}) {
@@ -49,7 +49,7 @@ void check(const Mask& mask) {
           }
           wrong += transform.distance_px()(v, u) == static_cast<float>(std::sqrt(static_cast<double>(squared))) ? 0 : 1;
           const Index y = at / mask.cols(), x = at % mask.cols();
-          const bool right = at >= 0 && y < mask.rows() && (mask(y, x) >= 128) == (part == MaskPart::liquid) &&
+          const bool right = at >= 0 && y < mask.rows() && (mask(y, x) >= 128) == (part == MaskPart::Liquid) &&
                              (u - x) * (u - x) + (v - y) * (v - y) == squared;
           misled += right ? 0 : 1;
         }

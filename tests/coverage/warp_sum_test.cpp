@@ -8,6 +8,7 @@
 
 #include "catch.hpp"
 #include "masks.hpp"
+#include "thread_check.hpp"
 
 namespace {
 
@@ -118,23 +119,7 @@ TEST_CASE("In the middle of liquid without an end in sight nothing pulls") {
   CHECK(std::abs(field.value({0, 129.5}).y()) < 0.02);
 }
 
-TEST_CASE("Any number of threads gives the same warp field") {
-  const auto mask = decant_test::masks()[13].mask;  // salt
-  const Image<float> coverage = decant_test::some_coverage(mask.rows(), mask.cols(), 3);
-  WarpSumField alone(260, 240);
-  alone.rebuild(mask, coverage, Threads{1});
-  for (const int threads : {2, 4}) {
-    WarpSumField field(260, 240);
-    field.rebuild(mask, coverage, Threads{threads});
-    Index different = 0;
-    for (double v = -100; v < 340; v += 2.3) {
-      for (double u = -100; u < 360; u += 2.9) {
-        different += field.value({u, v}) == alone.value({u, v}) ? 0 : 1;
-      }
-    }
-    CHECK(different == 0);
-  }
-}
+TEST_CASE("Any number of threads gives the same warp field") { decant_test::check_threads_agree<WarpSumField>(); }
 
 TEST_CASE("Warp fields that cannot be are refused") {
   CHECK_THROWS_WITH(WarpSumField(0, 10), "WarpSumField: width [px] must be 1 to 32768, got 0");

@@ -23,8 +23,8 @@ using namespace decant::testing;
 TEMPLATE_TEST_CASE("ResidualViscosity keeps the laws of a force", "", float, double) {
   ResidualViscosity<TestType> force;
   force.numerical_viscosity = TestType(1e-3);
-  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::linear_and_angular));
-  decant_test::check(force_laws<decant::WendlandC2<TestType>>(force, Keeps::linear_and_angular));
+  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::LinearAndAngular));
+  decant_test::check(force_laws<decant::WendlandC2<TestType>>(force, Keeps::LinearAndAngular));
 }
 
 namespace {

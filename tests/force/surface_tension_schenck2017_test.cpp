@@ -18,7 +18,7 @@ using decant::Vector3;
 using namespace decant::testing;
 
 TEMPLATE_TEST_CASE("SurfaceTensionSchenck2017 keeps the laws of a force but not momentum", "", float, double) {
-  decant_test::check(force_laws<CubicSpline<TestType>>(SurfaceTensionSchenck2017<TestType>{}, Keeps::neither));
+  decant_test::check(force_laws<CubicSpline<TestType>>(SurfaceTensionSchenck2017<TestType>{}, Keeps::Neither));
 }
 
 TEMPLATE_TEST_CASE("SurfaceTensionSchenck2017 is curvature times normal of the colour field", "", float, double) {

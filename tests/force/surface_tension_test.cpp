@@ -19,8 +19,8 @@ using decant::Vector3;
 using namespace decant::testing;
 
 TEMPLATE_TEST_CASE("SurfaceTension keeps the laws of a force and both momenta", "", float, double) {
-  decant_test::check(force_laws<CubicSpline<TestType>>(SurfaceTension<TestType>{}, Keeps::linear_and_angular));
-  decant_test::check(force_laws<decant::WendlandC2<TestType>>(SurfaceTension<TestType>{}, Keeps::linear_and_angular));
+  decant_test::check(force_laws<CubicSpline<TestType>>(SurfaceTension<TestType>{}, Keeps::LinearAndAngular));
+  decant_test::check(force_laws<decant::WendlandC2<TestType>>(SurfaceTension<TestType>{}, Keeps::LinearAndAngular));
 }
 
 TEMPLATE_TEST_CASE("SurfaceTension of zero leaves everything as it is", "", float, double) {

@@ -22,7 +22,7 @@ using namespace decant::testing;
 TEMPLATE_TEST_CASE("ViscositySchenck2017 keeps the laws of a force but not momentum", "", float, double) {
   ViscositySchenck2017<TestType> force;
   force.kinematic_viscosity = TestType(1e-3);
-  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::neither));
+  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::Neither));
 }
 
 TEMPLATE_TEST_CASE("ViscositySchenck2017 is the printed sum", "", float, double) {

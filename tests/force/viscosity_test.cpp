@@ -22,8 +22,8 @@ using namespace decant::testing;
 TEMPLATE_TEST_CASE("Viscosity keeps the laws of a force", "", float, double) {
   Viscosity<TestType> force;
   force.kinematic_viscosity = TestType(1e-3);
-  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::linear_and_angular));
-  decant_test::check(force_laws<decant::WendlandC2<TestType>>(force, Keeps::linear_and_angular));
+  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::LinearAndAngular));
+  decant_test::check(force_laws<decant::WendlandC2<TestType>>(force, Keeps::LinearAndAngular));
 }
 
 TEMPLATE_TEST_CASE("Viscosity of zero leaves everything as it is", "", float, double) {

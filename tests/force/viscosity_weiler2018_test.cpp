@@ -35,7 +35,7 @@ TEMPLATE_TEST_CASE("ViscosityWeiler2018 keeps the laws of a force", "", float, d
   ViscosityWeiler2018<TestType> force;
   for (const double nu : {1e-4, 1e-2, 1.0}) {
     force.kinematic_viscosity = static_cast<TestType>(nu);
-    decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::linear_and_angular));
+    decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::LinearAndAngular));
   }
 }
 
@@ -43,7 +43,7 @@ TEMPLATE_TEST_CASE("ViscosityWeiler2018 keeps momentum however early it stops", 
   ViscosityWeiler2018<TestType> force;
   force.kinematic_viscosity = 1;
   force.most_iterations = 3;
-  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::linear_and_angular));
+  decant_test::check(force_laws<CubicSpline<TestType>>(force, Keeps::LinearAndAngular));
   auto liquid = loose_ball<CubicSpline<TestType>>(TestType(0.005), 4, 0.2, 1.0);
   accelerations(force, liquid);
   CHECK(force.iterations() == 3);

@@ -5,32 +5,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <stdexcept>
 #include <string_view>
 
 #include <zlib.h>
 
 #include <decant/io/png.hpp>
 
-namespace {
-
-void require(bool holds) {
-  if (!holds) {
-    std::abort();
-  }
-}
-
-template <class Parse>
-void survive(Parse&& parse) {
-  try {
-    parse();
-  } catch (const std::runtime_error& error) {
-    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
-  }
-}
-
-}  // namespace
+#include "survive.hpp"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t max_size);
 

@@ -7,28 +7,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <stdexcept>
 #include <string_view>
 
 #include <decant/io/recording_reader.hpp>
 
+#include "survive.hpp"
+
 namespace {
-
-void require(bool holds) {
-  if (!holds) {
-    std::abort();
-  }
-}
-
-template <class Parse>
-void survive(Parse&& parse) {
-  try {
-    parse();
-  } catch (const std::runtime_error& error) {
-    require(std::string_view(error.what()).find('\n') == std::string_view::npos);
-  }
-}
 
 // What comes before the next divider, which is cut off.
 std::string_view next_part(std::string_view& rest) {

@@ -4,28 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <stdexcept>
 #include <string_view>
 
 #include <decant/io/motion_file.hpp>
 #include <decant/io/scene.hpp>
 #include <decant/io/series_file.hpp>
 
-namespace {
-
-template <class Parse>
-void survive(Parse&& parse) {
-  try {
-    parse();
-  } catch (const std::runtime_error& error) {
-    if (std::string_view(error.what()).find('\n') != std::string_view::npos) {
-      std::abort();  // a message of more than one line is a finding
-    }
-  }
-}
-
-}  // namespace
+#include "survive.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -31,7 +31,7 @@ struct NoWalls {
     return false;
   }
 #ifdef DECANT_TWIN
-  decant::GuardReport guard(const decant::ConstPointsView<double>&, double, double, decant::Threads,
+  decant::GuardReport guard(const decant::ConstPointsView<double>&, double, decant::Threads,
                             const decant::WallState<double>&, decant::FluidState<double>&) const noexcept {
     return {};
   }

@@ -39,7 +39,7 @@ TEST_CASE("mean density error of a collapsing block stays within tolerance in ev
     const auto report = simulator.step(settings.fixed_step);
     REQUIRE(report.sub_steps == 1);
     largest_report = std::max(largest_report, report.density_error);
-    not_converged += report.status == decant::StepStatus::ok ? 0 : 1;
+    not_converged += report.status == decant::StepStatus::Ok ? 0 : 1;
     if (step % 50 != 49) {
       continue;
     }

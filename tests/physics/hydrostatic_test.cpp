@@ -63,7 +63,7 @@ Reading watch_column(double spacing, double seconds) {
   std::vector<double> pressure(static_cast<std::size_t>(2 * layers)), height(pressure.size()), count(pressure.size());
   for (int f = 0; f < frames; ++f) {
     const auto report = simulator.step(frame);
-    reading.always_converged = reading.always_converged && report.status == decant::StepStatus::ok;
+    reading.always_converged = reading.always_converged && report.status == decant::StepStatus::Ok;
     reading.largest_density_error = std::max(reading.largest_density_error, report.density_error);
     const auto& fluid = simulator.fluid();
     const double center = decant_test::mean_over(fluid, [&](Index i) { return fluid.position(2, i); });

@@ -69,7 +69,7 @@ TEST_CASE("in a spinning tank the surface is a paraboloid", "[slow]") {
     samples.push_back({time, {Eigen::Quaterniond(Eigen::AngleAxisd(spin * time, Vector::UnitZ())), Vector::Zero()}});
   }
   const auto tank = simulator.add_body("tank", decant::CylinderInside{radius, 0.25, 0.02, decant::Face::PositiveZ},
-                                       decant::PoseTrack(samples), decant::Slip::none);
+                                       decant::PoseTrack(samples), decant::Slip::None);
   decant::fill(simulator, tank, decant::FillAmount::volume(std::numbers::pi * radius * radius * depth));
   auto& fluid = simulator.fluid();
   for (Index i = 0; i < fluid.size(); ++i) {

@@ -8,17 +8,12 @@
 
 #include "cameras.hpp"
 #include "catch.hpp"
+#include "drawn.hpp"
 
 namespace {
 
 using namespace decant;
-
-Image<float> drawn(DiscSplat<double> projector, const PointArray<double>& position, const PinholeCamera& camera,
-                   int threads = 1) {
-  Image<float> image(camera.height(), camera.width());
-  projector.render(position, {}, camera, {}, image, Threads{threads});
-  return image;
-}
+using decant_test::drawn;
 
 // Particles whose projections lie at chosen pixels and depths.
 PointArray<double> at(const PinholeCamera& camera, std::initializer_list<Vector3<double>> pixels_and_depths) {

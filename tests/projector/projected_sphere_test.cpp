@@ -8,18 +8,12 @@
 
 #include "cameras.hpp"
 #include "catch.hpp"
+#include "drawn.hpp"
 
 namespace {
 
 using namespace decant;
-
-template <class Camera>
-Image<float> drawn(ProjectedSphere<double> projector, const PointArray<double>& position, const Camera& camera,
-                   int threads = 1) {
-  Image<float> image(camera.height(), camera.width());
-  projector.render(position, {}, camera, {}, image, Threads{threads});
-  return image;
-}
+using decant_test::drawn;
 
 PointArray<double> one(const Vector3<double>& x) {
   PointArray<double> position(3, 1);

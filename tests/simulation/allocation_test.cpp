@@ -3,17 +3,19 @@
 
 #include <decant/simulation/simulator.hpp>
 
-#include <cmath>
 #include <vector>
 
 #include <decant/boundary/shapes.hpp>
 
 #include "allocation_count.hpp"
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 using decant_test::allocations;
+using decant_test::block;
 using decant_test::watching;
+using decant_test::with_spacing;
 
 namespace {
 
@@ -21,30 +23,14 @@ namespace {
 template <class Parts>
 std::vector<long> allocations_per_frame(int threads, int warm_up, int frames) {
   using Scalar = typename Parts::Scalar;
-  SimulatorSettings settings;
-  settings.spacing = 0.006;
-  settings.threads = {threads};
-  Simulator<Parts> simulator(settings);
-  std::vector<PoseTrack::Sample> rocking;
-  for (int k = 0; k <= 400; ++k) {
-    const double t = 0.01 * k;
-    rocking.push_back(
-        {t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(7 * t), Eigen::Vector3d::UnitY())), {}}});
-    rocking.back().pose.translation.setZero();
-  }
-  const BodyId box = simulator.add_body("box", BoxInside{{0, 0, 0}, {0.06, 0.06, 0.08}, 0.002, {}}, PoseTrack(rocking));
+  constexpr double spacing = 0.006;  // [m]
+  Simulator<Parts> simulator(with_spacing(spacing, threads));
+  const BodyId box =
+      simulator.add_body("box", BoxInside{{0, 0, 0}, {0.06, 0.06, 0.08}, 0.002, {}}, decant_test::rocking(4, 7));
   simulator.add_body("post", TriangleMesh(Cylinder{0.008, 0.1}.mesh()),
                      PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.03, 0.03, -0.1}}));
-  constexpr int side = 10, layers = 7;
-  PointArray<Scalar> x(3, side * side * layers);
-  Index n = 0;
-  for (int i = 0; i < side; ++i) {
-    for (int j = 0; j < side; ++j) {
-      for (int k = 0; k < layers; ++k) {
-        x.col(n++) = (settings.spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
+  const auto x = block<Scalar>(10, 10, 7, spacing);
+  const Index n = x.cols();
   simulator.add_particles(x, PointArray<Scalar>::Zero(3, n), 0);
   simulator.watch_contents(box);
   std::vector<long> counts;

@@ -110,7 +110,7 @@ PoseTrack driven(const Drive& drive, double seconds) {
   return PoseTrack(std::move(samples));
 }
 
-enum class Region { inside, above, outside };
+enum class Region { Inside, Above, Outside };
 
 struct Outcome {
   Index particles = 0;
@@ -132,9 +132,9 @@ Outcome watch(Simulator<Parts>& simulator, BodyId body, const Vessel& vessel, do
   const auto& surface = *simulator.bodies()[body].surface;
   const auto region_of = [&](const Vector3<double>& x) {
     if (x[2] > vessel.rim) {
-      return Region::above;
+      return Region::Above;
     }
-    return vessel.inside(x) ? Region::inside : Region::outside;
+    return vessel.inside(x) ? Region::Inside : Region::Outside;
   };
   std::unordered_map<std::uint32_t, Seen> seen;
   const double spacing = simulator.settings().spacing;
@@ -175,19 +175,19 @@ Outcome watch(Simulator<Parts>& simulator, BodyId body, const Vessel& vessel, do
       outcome.fastest = std::max(outcome.fastest, speed);
       const Vector3<double> x = body_from_world * place;
       const Region region = region_of(x);
-      ++(region == Region::inside ? outcome.inside : outcome.spilled);
+      ++(region == Region::Inside ? outcome.inside : outcome.spilled);
       const auto [entry, fresh] = seen.try_emplace(fluid.id[i], Seen{region, x[2], speed});
       Seen& before = entry->second;
       if (fresh) {
         outcome.missing += k > 0 ? 1 : 0;
-      } else if (before.region != region && before.region != Region::above && region != Region::above) {
+      } else if (before.region != region && before.region != Region::Above && region != Region::Above) {
         // From inside to outside or back within one call, both below the rim: only over it, and only if that is near.
         const double way = 2 * vessel.rim - before.height - x[2];
         const double reach =
             1.5 * frame * (std::max(before.speed, speed) + std::max(wall_speed, earlier_wall_speed)) + spacing;
         outcome.through_wall += way > reach ? 1 : 0;
       }
-      if (region == Region::outside && surface.inside_material(x) &&
+      if (region == Region::Outside && surface.inside_material(x) &&
           surface.closest_point(x, 1).value().distance > slack) {
         ++outcome.in_material;
       }
@@ -198,7 +198,7 @@ Outcome watch(Simulator<Parts>& simulator, BodyId body, const Vessel& vessel, do
     // what has left for good would fall ever faster and shorten everybody's steps
     removed += simulator.remove_particles_if([&](Index i) {
       const Vector3<double> x = body_from_world * Vector3<double>(fluid.position.col(i).template cast<double>());
-      return region_of(x) != Region::inside &&
+      return region_of(x) != Region::Inside &&
              (x - surface.bounds().center()).norm() > surface.bounds().diagonal().norm();
     });
   }

@@ -18,6 +18,7 @@
 #include <decant/neighbor/kd_tree.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
@@ -27,30 +28,14 @@ namespace {
 template <class Parts>
 Simulator<Parts> splash(int threads, int per_side = 10) {
   using Scalar = typename Parts::Scalar;
-  SimulatorSettings settings;
-  settings.spacing = 0.006;
-  settings.threads = {threads};
-  Simulator<Parts> simulator(settings);
-  std::vector<PoseTrack::Sample> rocking;
-  for (int k = 0; k <= 100; ++k) {
-    const double t = 0.01 * k;
-    rocking.push_back(
-        {t, {Eigen::Quaterniond(Eigen::AngleAxisd(0.1 * std::sin(9 * t), Eigen::Vector3d::UnitY())), {}}});
-    rocking.back().pose.translation = {0.01 * std::sin(12 * t), 0, 0};
-  }
-  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, 0.0601, 0.12}, 0.002, {}}, PoseTrack(rocking));
+  constexpr double spacing = 0.006;  // [m]
+  Simulator<Parts> simulator(decant_test::with_spacing(spacing, threads));
+  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, 0.0601, 0.12}, 0.002, {}},
+                     decant_test::rocking(1, 9, 0.01, 12));
   simulator.add_body("post", TriangleMesh(Cylinder{0.006, 0.05}.mesh()),
-                     PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.066, 0.03, 0.035}}), Slip::none);
-  PointArray<Scalar> x(3, per_side * per_side * per_side);
-  Index n = 0;
-  for (int i = 0; i < per_side; ++i) {
-    for (int j = 0; j < per_side; ++j) {
-      for (int k = 0; k < per_side; ++k) {
-        x.col(n++) = (settings.spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
-  simulator.add_particles(x, PointArray<Scalar>::Zero(3, n), 0);
+                     PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.066, 0.03, 0.035}}), Slip::None);
+  const auto x = decant_test::block<Scalar>(per_side, per_side, per_side, spacing);
+  simulator.add_particles(x, PointArray<Scalar>::Zero(3, x.cols()), 0);
   InletSettings inlet;
   inlet.position = {0.05, 0.03, 0.085};
   inlet.radius = 0.008;

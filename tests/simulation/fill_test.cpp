@@ -10,6 +10,7 @@
 #include <decant/simulation/simulator.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
@@ -17,12 +18,7 @@ namespace {
 
 constexpr double pi = 3.14159265358979323846;
 
-SimulatorSettings with_spacing(double spacing) {
-  SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {1};
-  return settings;
-}
+using decant_test::with_spacing;
 
 }  // namespace
 

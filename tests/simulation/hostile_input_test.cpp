@@ -17,20 +17,18 @@
 #include <decant/simulation/fill.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
 namespace {
 
+using decant_test::block;
+
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 
-SimulatorSettings coarse() {
-  SimulatorSettings settings;
-  settings.spacing = 0.008;
-  settings.threads = {1};
-  return settings;
-}
+SimulatorSettings coarse() { return decant_test::with_spacing(0.008); }
 
 // The one line that a set-up error says; empty if nothing was thrown.
 std::string refusal(const std::function<void()>& call) {
@@ -45,26 +43,12 @@ std::string refusal(const std::function<void()>& call) {
   return {};
 }
 
-template <class Scalar>
-PointArray<Scalar> block(int per_side, double spacing, const Vector3<double>& corner = Vector3<double>::Zero()) {
-  PointArray<Scalar> x(3, per_side * per_side * per_side);
-  Index n = 0;
-  for (int i = 0; i < per_side; ++i) {
-    for (int j = 0; j < per_side; ++j) {
-      for (int k = 0; k < per_side; ++k) {
-        x.col(n++) = (corner + spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
-  return x;
-}
-
 // A small open box, half full, that has run a little.
 template <class Scalar>
 Simulator<DefaultParts<Scalar>> half_full_box() {
   Simulator<DefaultParts<Scalar>> simulator(coarse());
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
-  const auto x = block<Scalar>(6, 0.008);
+  const auto x = block<Scalar>(6, 6, 6, 0.008);
   simulator.add_particles(x, PointArray<Scalar>::Zero(3, x.cols()), 0);
   REQUIRE(simulator.step(0.05).advanced());
   return simulator;
@@ -222,7 +206,7 @@ TEST_CASE("hostile: an inverted mesh holds liquid all the same") {
   }
   LiquidSimulator simulator(coarse());
   const BodyId body = simulator.add_body("inverted", mesh);
-  const auto x = block<float>(4, 0.008, {-0.016, -0.016, 0.001});
+  const auto x = block<float>(4, 4, 4, 0.008, {-0.016, -0.016, 0.001});
   simulator.add_particles(x, PointArray<float>::Zero(3, x.cols()), body);
   for (int k = 0; k < 20; ++k) {
     REQUIRE(simulator.step(0.02).advanced());
@@ -239,18 +223,18 @@ TEMPLATE_TEST_CASE("hostile: frame times out of range change nothing", "", float
   const double time = simulator.time();
   for (const double frame : {-0.01, not_a_number, unbounded, -unbounded}) {
     const StepReport report = simulator.step(frame);
-    CHECK(report.status == StepStatus::bad_time_step);
+    CHECK(report.status == StepStatus::BadTimeStep);
     CHECK_FALSE(report.advanced());
     CHECK(same_bits(simulator.fluid(), before));
     CHECK(simulator.time() == time);
   }
   const StepReport still = simulator.step(0);
-  CHECK(still.status == StepStatus::ok);
+  CHECK(still.status == StepStatus::Ok);
   CHECK(still.sub_steps == 0);
   CHECK(still.particles == before.size());
   CHECK(same_bits(simulator.fluid(), before));
   CHECK(simulator.step(1e-12).advanced());
-  CHECK(simulator.step(1e6).status == StepStatus::too_many_steps);
+  CHECK(simulator.step(1e6).status == StepStatus::TooManySteps);
 }
 
 TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the frame and stays as it was", "", float,
@@ -263,7 +247,7 @@ TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the
         settings.fixed_step = fixed;
         Simulator<DefaultParts<TestType>> simulator(settings);
         simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
-        const auto x = block<TestType>(5, 0.008);
+        const auto x = block<TestType>(5, 5, 5, 0.008);
         simulator.add_particles(x, PointArray<TestType>::Zero(3, x.cols()), 0);
         REQUIRE(simulator.step(0.01).advanced());
         const auto good = simulator.snapshot();
@@ -276,7 +260,7 @@ TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the
           CHECK((report.advanced() ? simulator.fluid().position.allFinite() && simulator.fluid().velocity.allFinite()
                                    : same_bits(simulator.fluid(), before)));
         } else {
-          CHECK(report.status == StepStatus::non_finite);
+          CHECK(report.status == StepStatus::NonFinite);
           CHECK(same_bits(simulator.fluid(), before));
           CHECK(simulator.time() == time);
         }
@@ -341,7 +325,7 @@ TEMPLATE_TEST_CASE("hostile: no particle and one particle", "", float, double) {
   Simulator<DefaultParts<TestType>> simulator(coarse());
   simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
   const StepReport empty = simulator.step(0.1);
-  CHECK(empty.status == StepStatus::ok);
+  CHECK(empty.status == StepStatus::Ok);
   CHECK(empty.particles == 0);
   CHECK(empty.volume == 0);
   CHECK(simulator.time() == Approx(0.1));
@@ -358,7 +342,7 @@ TEMPLATE_TEST_CASE("hostile: no particle and one particle", "", float, double) {
   check_in_box(simulator);
   CHECK(simulator.fluid().position(2, 0) < TestType(0.01));
   CHECK(simulator.remove_particles_if([](Index) { return true; }) == 1);
-  CHECK(simulator.step(0.02).status == StepStatus::ok);
+  CHECK(simulator.step(0.02).status == StepStatus::Ok);
 }
 
 TEST_CASE("hostile: a body that is put into the liquid pushes it out and loses none") {
@@ -419,7 +403,7 @@ TEST_CASE("hostile: a pose that jumps by a metre is refused with a status or car
       }
       CHECK(report.lost == 0);
     } else {
-      CHECK(report.status == StepStatus::too_many_steps);
+      CHECK(report.status == StepStatus::TooManySteps);
       CHECK(same_bits(simulator.fluid(), before));
       CHECK(simulator.time() == time);
     }
@@ -479,7 +463,7 @@ TEST_CASE("hostile: a flow beyond reason is stopped by a status") {
   inlet.flow = {{0, 10}, {1, 10}};  // 30 km/s
   simulator.add_inlet(inlet, 0);
   const StepReport report = simulator.step(0.02);
-  CHECK(report.status == StepStatus::too_many_steps);
+  CHECK(report.status == StepStatus::TooManySteps);
   CHECK(simulator.fluid().size() == 0);
   CHECK(simulator.time() == 0);
 }

@@ -3,6 +3,7 @@
 
 #include <decant/simulation/liquid.hpp>
 
+#include <cmath>
 #include <limits>
 
 #include "catch.hpp"
@@ -20,6 +21,11 @@ TEST_CASE("liquid: the table's entries are valid and in the order of everyday ex
   // IAPWS at 20 degrees Celsius
   CHECK(liquids::water.density == Approx(998.2).epsilon(1e-4));
   CHECK(liquids::water.kinematic_viscosity() == Approx(1.0034e-6).epsilon(1e-3));
+  const double below_critical = 1 - 293.15 / 647.096;  // R1-76, equation 1
+  CHECK(liquids::water.surface_tension ==
+        Approx(0.2358 * std::pow(below_critical, 1.256) * (1 - 0.625 * below_critical)).epsilon(1e-4));
+  // Bertsch 1983, whole and skim milk
+  CHECK(liquids::milk.surface_tension == Approx(1e-3 * (1.8e-4 * 20 * 20 - 0.163 * 20 + 55.6)).epsilon(1e-3));
   CHECK(liquids::olive_oil.density < liquids::water.density);
   CHECK(liquids::water.density < liquids::milk.density);
   CHECK(liquids::milk.density < liquids::glycerol.density);

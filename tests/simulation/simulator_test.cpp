@@ -15,31 +15,14 @@
 #include <decant/simulation/fill.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
 namespace {
 
-SimulatorSettings with_spacing(double spacing) {
-  SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {1};
-  return settings;
-}
-
-template <class Scalar>
-PointArray<Scalar> block(int nx, int ny, int nz, double spacing) {
-  PointArray<Scalar> x(3, nx * ny * nz);
-  Index n = 0;
-  for (int i = 0; i < nx; ++i) {
-    for (int j = 0; j < ny; ++j) {
-      for (int k = 0; k < nz; ++k) {
-        x.col(n++) = (spacing * Vector3<double>(i + 0.5, j + 0.5, k + 0.5)).template cast<Scalar>();
-      }
-    }
-  }
-  return x;
-}
+using decant_test::block;
+using decant_test::with_spacing;
 
 template <class Scalar>
 Simulator<DefaultParts<Scalar>> box_of_liquid() {
@@ -78,11 +61,11 @@ TEMPLATE_TEST_CASE("simulator: a frame takes its time and reports what there is"
 }
 
 TEST_CASE("simulator: a status has a name") {
-  CHECK(std::string(to_string(StepStatus::ok)) == "ok");
-  CHECK(std::string(to_string(StepStatus::not_converged)) == "not converged");
-  CHECK(std::string(to_string(StepStatus::bad_time_step)) == "bad time step");
-  CHECK(std::string(to_string(StepStatus::too_many_steps)) == "too many sub-steps");
-  CHECK(std::string(to_string(StepStatus::non_finite)) == "non-finite");
+  CHECK(std::string(to_string(StepStatus::Ok)) == "ok");
+  CHECK(std::string(to_string(StepStatus::NotConverged)) == "not converged");
+  CHECK(std::string(to_string(StepStatus::BadTimeStep)) == "bad time step");
+  CHECK(std::string(to_string(StepStatus::TooManySteps)) == "too many sub-steps");
+  CHECK(std::string(to_string(StepStatus::NonFinite)) == "non-finite");
   CHECK(std::string(to_string(static_cast<StepStatus>(99))) == "unknown");
 }
 

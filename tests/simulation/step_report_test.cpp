@@ -11,6 +11,7 @@
 #include <decant/simulation/simulator.hpp>
 
 #include "catch.hpp"
+#include "scene.hpp"
 
 using namespace decant;
 
@@ -18,21 +19,12 @@ namespace {
 
 constexpr double d = 0.008;  // spacing [m]
 
-SimulatorSettings settings_for(int threads) {
-  SimulatorSettings settings;
-  settings.spacing = d;
-  settings.threads = {threads};
-  return settings;
-}
+SimulatorSettings settings_for(int threads) { return decant_test::with_spacing(d, threads); }
 
 // n^3 particles on a lattice of one spacing from a corner on.
 template <class Scalar>
 PointArray<Scalar> cube(int n, const Vector3<double>& corner) {
-  PointArray<Scalar> x(3, n * n * n);
-  for (int k = 0; k < n * n * n; ++k) {
-    x.col(k) = (corner + d * Vector3<double>(k % n + 0.5, k / n % n + 0.5, k / n / n + 0.5)).template cast<Scalar>();
-  }
-  return x;
+  return decant_test::block<Scalar>(n, n, n, d, corner);
 }
 
 template <class Parts>

@@ -78,8 +78,8 @@ TEST_CASE("tracker: frames that are late, far ahead, or wrong are answered by a 
   tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
   const Mask mask = seen(tracker.model().dust);
   const std::vector<CameraMask> masks{{0, mask}};
-  CHECK(tracker.track({0, {}, masks}).status == FrameStatus::ok);
-  CHECK(tracker.track({0.1, {}, masks}).status == FrameStatus::ok);
+  CHECK(tracker.track({0, {}, masks}).status == FrameStatus::Ok);
+  CHECK(tracker.track({0.1, {}, masks}).status == FrameStatus::Ok);
   const auto require_refused = [&](const TrackerFrame& frame, FrameStatus status) {
     const auto before = tracker.model().dust;
     const FrameReport report = tracker.track(frame);
@@ -90,25 +90,25 @@ TEST_CASE("tracker: frames that are late, far ahead, or wrong are answered by a 
     REQUIRE(tracker.model().now == 0.1);
     REQUIRE(tracker.model().dust.position == before.position);
   };
-  require_refused({0.05, {}, masks}, FrameStatus::late);
-  require_refused({0.1, {}, masks}, FrameStatus::late);
-  require_refused({2, {}, masks}, FrameStatus::gap);
-  require_refused({std::numeric_limits<double>::quiet_NaN(), {}, masks}, FrameStatus::gap);
+  require_refused({0.05, {}, masks}, FrameStatus::Late);
+  require_refused({0.1, {}, masks}, FrameStatus::Late);
+  require_refused({2, {}, masks}, FrameStatus::Gap);
+  require_refused({std::numeric_limits<double>::quiet_NaN(), {}, masks}, FrameStatus::Gap);
   const Mask other = Mask::Zero(10, 10);
   const std::vector<CameraMask> wrong_size{{0, other}}, no_camera{{3, mask}};
-  require_refused({0.2, {}, wrong_size}, FrameStatus::bad_input);
-  require_refused({0.2, {}, no_camera}, FrameStatus::bad_input);
+  require_refused({0.2, {}, wrong_size}, FrameStatus::BadInput);
+  require_refused({0.2, {}, no_camera}, FrameStatus::BadInput);
   Pose lost;
   lost.translation.x() = std::numeric_limits<double>::infinity();
   const std::vector<TrackedPose> no_pose{{0, lost}}, no_body{{7, Pose{}}};
-  require_refused({0.2, no_pose, masks}, FrameStatus::bad_input);
-  require_refused({0.2, no_body, masks}, FrameStatus::bad_input);
+  require_refused({0.2, no_pose, masks}, FrameStatus::BadInput);
+  require_refused({0.2, no_body, masks}, FrameStatus::BadInput);
   tracker.model().broken = true;
-  require_refused({0.2, {}, masks}, FrameStatus::model_failed);
+  require_refused({0.2, {}, masks}, FrameStatus::ModelFailed);
   tracker.model().broken = false;
   // a dropped frame: time goes on
   const FrameReport dropped = tracker.track({0.2, {}, {}});
-  CHECK(dropped.status == FrameStatus::uncorrected);
+  CHECK(dropped.status == FrameStatus::Uncorrected);
   CHECK(dropped.advanced());
   CHECK(std::isnan(dropped.prior.iou()));
   CHECK(tracker.model().now == Approx(0.2));
@@ -126,7 +126,7 @@ TEST_CASE("tracker: takes bodies to their poses and sees what they hide") {
                        {0, -0.3, 0}};
   const std::vector<TrackedPose> poses{{0, before_it}};
   const FrameReport report = tracker.track({0.1, poses, masks});
-  CHECK(report.status == FrameStatus::ok);
+  CHECK(report.status == FrameStatus::Ok);
   CHECK(report.prior.predicted_px == 0);
   CHECK(report.prior.observed_px > 1000);
 }
@@ -170,7 +170,7 @@ TEST_CASE("tracker: a drop that really falls more slowly is followed, and its sp
       const Mask mask = seen(decant_test::liquid_block<float>({0, 0, 0.05 - 0.5 * real * t * t}));
       const std::vector<CameraMask> masks{{0, mask}};
       report = tracker.track({t, {}, masks});
-      REQUIRE(report.status == FrameStatus::ok);
+      REQUIRE(report.status == FrameStatus::Ok);
     }
     return std::pair{report, tracker.model()};
   };

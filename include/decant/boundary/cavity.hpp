@@ -401,14 +401,14 @@ inline void Cavity::flood(Pieces& pieces) const {
   };
   // Material is never entered; knowing it saves the search for a way through its walls. Both tests have to agree, so
   // that a triangle turned the wrong way does not make a wall of what is free.
-  enum class Kind : std::uint8_t { unknown, free, material };
-  std::vector<Kind> kind(pieces.piece.size(), Kind::unknown);
+  enum class Kind : std::uint8_t { Unknown, Free, Material };
+  std::vector<Kind> kind(pieces.piece.size(), Kind::Unknown);
   const auto is_material = [&](std::uint32_t a) {
-    if (kind[a] == Kind::unknown) {
+    if (kind[a] == Kind::Unknown) {
       const bool material = pieces.winding[a] != 0 && surface_->inside_material(middle_of(pieces, a));
-      kind[a] = material ? Kind::material : Kind::free;
+      kind[a] = material ? Kind::Material : Kind::Free;
     }
-    return kind[a] == Kind::material;
+    return kind[a] == Kind::Material;
   };
   std::priority_queue<Front> front;
   pieces.level.assign(pieces.piece.size(), infinity);

@@ -22,8 +22,8 @@ using BodyId = std::uint32_t;
 
 /// How liquid moves along a wall.
 enum class Slip {
-  free,  ///< without friction: right where the boundary layer is thinner than a particle
-  none,  ///< the liquid at the wall moves with it, pulled by its viscosity
+  Free,  ///< without friction: right where the boundary layer is thinner than a particle
+  None,  ///< the liquid at the wall moves with it, pulled by its viscosity
 };
 
 /// What guarding a step took.
@@ -58,8 +58,8 @@ struct GuardReport {
 /// will not stay still; WallFunction has a pair for plane walls.
 /// separated(a, b, contacts, count): whether a wall stands between two points, of which one has these contacts. Called
 /// from many threads; has to be true of (b, a) where it is of (a, b).
-/// guard(before, time_step, clearance [m], threads, walls, fluid): the end of a sub-step. `walls` is as sampled at
-/// `before`, fluid.position is where particles want to go: bends steps that would cross a wall or end nearer to it than
+/// guard(before, clearance [m], threads, walls, fluid): the end of a sub-step. `walls` is as sampled at `before`,
+/// fluid.position is where particles want to go: bends steps that would cross a wall or end nearer to it than
 /// `clearance`, and takes the part of their velocity that points into it. What it lets pass has leaked.
 /// Results have to be the same bits for any number of threads. Laws: decant/testing/boundary.hpp.
 template <class B, class Kernel>
@@ -82,7 +82,7 @@ concept Boundary =
       { built.largest_relative_speed(sampled_fluid, threads, reduction) } noexcept -> std::same_as<double>;
       { built.sample(position, number, threads, walls) } noexcept -> std::same_as<void>;
       { built.separated(x, x, contacts, count) } noexcept -> std::same_as<bool>;
-      { built.guard(position, number, number, threads, sampled, fluid) } noexcept -> std::same_as<GuardReport>;
+      { built.guard(position, number, threads, sampled, fluid) } noexcept -> std::same_as<GuardReport>;
     };
 
 }  // namespace decant

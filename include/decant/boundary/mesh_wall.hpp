@@ -53,9 +53,9 @@ class MeshWall {
   /// False where no wall is within the support of x (in the body's frame).
   bool sample(const Vector3<double>& x, WallSample& result) const noexcept {
     switch (look_up(x, result)) {
-      case LookUp::far:
+      case LookUp::Far:
         return false;
-      case LookUp::crossed:
+      case LookUp::Crossed:
         return sample_close(x, result);
       default:
         return result.share > 0;
@@ -92,7 +92,7 @@ class MeshWall {
   }
 
  private:
-  enum class LookUp { far, found, crossed };
+  enum class LookUp { Far, Found, Crossed };
 
   /// From the grid; a cell that the surface passes through has corners that see different sides, and no answer.
   LookUp look_up(const Vector3<double>& x, WallSample& result) const noexcept {
@@ -101,7 +101,7 @@ class MeshWall {
     for (int axis = 0; axis < 3; ++axis) {
       const double place = (x[axis] - origin_[axis]) / cell_;
       if (!(place >= 0 && place < static_cast<double>(blocks_[static_cast<std::size_t>(axis)] * block_cells))) {
-        return LookUp::far;
+        return LookUp::Far;
       }
       const auto at = static_cast<std::size_t>(axis);
       cell[at] = static_cast<int>(place);
@@ -110,12 +110,12 @@ class MeshWall {
     const std::int32_t block =
         block_of_[block_number(cell[0] / block_cells, cell[1] / block_cells, cell[2] / block_cells)];
     if (block < 0) {
-      return LookUp::far;
+      return LookUp::Far;
     }
     const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
     const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
     if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
-      return LookUp::crossed;
+      return LookUp::Crossed;
     }
     NodeValues mean = NodeValues::Zero();
     for (int corner = 0; corner < 8; ++corner) {
@@ -128,7 +128,7 @@ class MeshWall {
     const NodeValues scaled = plane_.slope(mean[0]) * mean;
     result.gradient = scaled.segment<3>(1);
     result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
-    return LookUp::found;
+    return LookUp::Found;
   }
 
   /// Close to the surface: from the grid a little farther off it, with the part of the nearest wall, taken for a plane,
@@ -145,7 +145,7 @@ class MeshWall {
     const Vector3<double> toward = (nearest->point - x) / distance;
     const Vector3<double> back = x - (clear - distance) * toward;
     WallSample farther;
-    if (look_up(back, farther) != LookUp::found || surface_->any_hit(x, back) ||
+    if (look_up(back, farther) != LookUp::Found || surface_->any_hit(x, back) ||
         !(std::abs(farther.share - plane_.share(clear)) < 0.1 * plane_.share(clear))) {
       return sample_directly(x, result);
     }

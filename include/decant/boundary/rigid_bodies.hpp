@@ -49,7 +49,7 @@ class RigidBodies {
     std::shared_ptr<const BoundingVolumeHierarchy> surface{};
     std::shared_ptr<const std::variant<MeshWallType, SolidParts>> wall{};
     PoseTrack motion{};
-    Slip slip = Slip::free;
+    Slip slip = Slip::Free;
     Eigen::AlignedBox3d bounds{};         ///< in the body's frame [m]
     std::vector<std::string> warnings{};  ///< what is wrong with its mesh, one line each (boundary/mesh_report.hpp)
     Pose before{}, after{};               ///< at the ends of the current step
@@ -192,25 +192,25 @@ class RigidBodies {
   }
 
   /// Bends the steps of particles that would cross a wall or come nearer to it than `clearance` [m]. Particles go from
-  /// `before` to `after` (3xN [m], changed) in time_step [s] while the bodies move through the interval; velocities of
-  /// bent steps become what the step was. `walls` is as sampled at `before`.
-  GuardReport guard(const ConstPointsView<Scalar>& before, double time_step, double clearance, Threads threads,
+  /// `before` (3xN [m]) to fluid.position (changed) while the bodies move through the interval; those that were bent
+  /// lose the part of their velocity that points into the wall. `walls` is as sampled at `before`.
+  GuardReport guard(const ConstPointsView<Scalar>& before, double clearance, Threads threads,
                     const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     if (bodies_.empty()) {
       return {};
     }
     std::atomic<Index> slid{0}, stopped{0}, lost{0};
     parallel_for(before.cols(), threads, [&](Index i) {
-      switch (guard_particle(i, before, time_step, clearance, walls, fluid)) {
-        case Outcome::free:
+      switch (guard_particle(i, before, clearance, walls, fluid)) {
+        case Outcome::Free:
           break;
-        case Outcome::slid:
+        case Outcome::Slid:
           slid.fetch_add(1, std::memory_order_relaxed);
           break;
-        case Outcome::stopped:
+        case Outcome::Stopped:
           stopped.fetch_add(1, std::memory_order_relaxed);
           break;
-        case Outcome::lost:
+        case Outcome::Lost:
           lost.fetch_add(1, std::memory_order_relaxed);
           break;
       }
@@ -219,7 +219,7 @@ class RigidBodies {
   }
 
  private:
-  enum class Outcome { free, slid, stopped, lost };
+  enum class Outcome { Free, Slid, Stopped, Lost };
 
   /// A body's share of one particle's support, in the world frame.
   struct Share {
@@ -318,7 +318,7 @@ class RigidBodies {
       // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own
       // layer and the quotient would only measure rounding.
       const double distance = std::max(near[k].distance, 0.25 * spacing);
-      contact.friction = body.slip == Slip::free
+      contact.friction = body.slip == Slip::Free
                              ? Scalar(0)
                              : static_cast<Scalar>(weight * 2 * half_space_.slope(near[k].distance) / distance);
     }
@@ -335,13 +335,13 @@ class RigidBodies {
     walls.contact_count[i] = static_cast<std::uint8_t>(count);
   }
 
-  Outcome guard_particle(Index i, const ConstPointsView<Scalar>& before, double time_step, double clearance,
+  Outcome guard_particle(Index i, const ConstPointsView<Scalar>& before, double clearance,
                          const WallState<Scalar>& walls, FluidState<Scalar>& fluid) const noexcept {
     const Vector3<double> x0 = before.col(i).template cast<double>();
     Vector3<double> x1 = fluid.position.col(i).template cast<double>();
     // looked-up distances may be off by a fraction of a grid cell; a tenth covers that
     const double room = 0.9 * static_cast<double>(walls.distance[i]) - clearance;
-    Outcome outcome = Outcome::free;
+    Outcome outcome = Outcome::Free;
     const Body* touched = nullptr;
     constexpr int most_rounds = 3;
     for (int round = 0;; ++round) {
@@ -362,21 +362,21 @@ class RigidBodies {
           continue;
         }
         const SweptResult result = keep_on_side(*body.surface, start, end, clearance);
-        if (result != SweptResult::free) {
+        if (result != SweptResult::Free) {
           x1 = body.after * end;
           changed = true;
           touched = &body;
-          outcome = std::max(outcome, result == SweptResult::slid ? Outcome::slid : Outcome::stopped);
+          outcome = std::max(outcome, result == SweptResult::Slid ? Outcome::Slid : Outcome::Stopped);
         }
       }
       if (!changed || round + 1 == most_rounds || bodies_.size() == 1) {
         if (changed && bodies_.size() > 1 && crosses_any(x0, x1)) {
-          outcome = Outcome::lost;
+          outcome = Outcome::Lost;
         }
         break;
       }
     }
-    if (outcome != Outcome::free) {
+    if (outcome != Outcome::Free) {
       // The wall takes the speed toward it and gives none: what it moved the particle by is not motion.
       const Vector3<double> push = x1 - fluid.position.col(i).template cast<double>();
       const double length = push.norm();
@@ -391,7 +391,6 @@ class RigidBodies {
       }
       fluid.position.col(i) = x1.template cast<Scalar>();
     }
-    (void)time_step;
     return outcome;
   }
 

@@ -10,9 +10,9 @@ namespace decant {
 
 /// What a path needed in order to stay on its side.
 enum class SweptResult {
-  free,     ///< nothing: the path met no wall
-  slid,     ///< the end was moved, and the new path crosses no wall
-  stopped,  ///< no free end was found nearby: the particle stays where it was, relative to the body
+  Free,     ///< nothing: the path met no wall
+  Slid,     ///< the end was moved, and the new path crosses no wall
+  Stopped,  ///< no free end was found nearby: the particle stays where it was, relative to the body
 };
 
 /// Moves `end` so that the straight path from `start` to it, both in the body's frame, does not cross the surface, and
@@ -23,7 +23,7 @@ enum class SweptResult {
 inline SweptResult keep_on_side(const BoundingVolumeHierarchy& surface, const Vector3<double>& start,
                                 Vector3<double>& end, double clearance) noexcept {
   constexpr int most_slides = 4;  // a corner of three walls takes three
-  SweptResult result = SweptResult::free;
+  SweptResult result = SweptResult::Free;
   bool crosses = false;
   for (int slide = 0; slide <= most_slides; ++slide) {
     const auto hit = surface.first_hit(start, end);
@@ -33,17 +33,17 @@ inline SweptResult keep_on_side(const BoundingVolumeHierarchy& surface, const Ve
     }
     const Vector3<double> normal = (start - end).dot(hit->normal) >= 0 ? hit->normal : Vector3<double>(-hit->normal);
     end += normal * (clearance - (end - hit->point).dot(normal));
-    result = SweptResult::slid;
+    result = SweptResult::Slid;
   }
   if (crosses) {
     end = start;
-    return SweptResult::stopped;
+    return SweptResult::Stopped;
   }
   if (const auto near = surface.closest_point(end, clearance); near && near->distance > 0) {
     const Vector3<double> farther = near->point + (end - near->point) * (clearance / near->distance);
     if (!surface.any_hit(start, farther)) {
       end = farther;
-      result = SweptResult::slid;
+      result = SweptResult::Slid;
     }
   }
   return result;

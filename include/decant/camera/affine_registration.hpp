@@ -40,7 +40,7 @@ enum class AffineFitStatus {
 };
 
 /// The status in words.
-constexpr std::string_view describe(AffineFitStatus status) noexcept {
+constexpr std::string_view to_string(AffineFitStatus status) noexcept {
   switch (status) {
     case AffineFitStatus::Good:
       return "good";

@@ -23,17 +23,17 @@ namespace decant {
 namespace detail {
 
 // Which registers there are. AVX-512 is used where the parts that all but the first processors have are there.
-enum class VectorUnit { avx512, avx2, basic };
+enum class VectorUnit { Avx512, Avx2, Basic };
 #if defined(__AVX512F__) && defined(__AVX512VL__) && defined(__AVX512DQ__)
-inline constexpr VectorUnit vector_unit = VectorUnit::avx512;
+inline constexpr VectorUnit vector_unit = VectorUnit::Avx512;
 #elif defined(__AVX2__)
-inline constexpr VectorUnit vector_unit = VectorUnit::avx2;
+inline constexpr VectorUnit vector_unit = VectorUnit::Avx2;
 #else
-inline constexpr VectorUnit vector_unit = VectorUnit::basic;
+inline constexpr VectorUnit vector_unit = VectorUnit::Basic;
 #endif
 
 // GCC 12 warns of intrinsics whose untouched lanes are undefined; the zeroing forms compile to the same instructions.
-inline constexpr int vector_bytes = vector_unit == VectorUnit::avx512 ? 64 : vector_unit == VectorUnit::avx2 ? 32 : 16;
+inline constexpr int vector_bytes = vector_unit == VectorUnit::Avx512 ? 64 : vector_unit == VectorUnit::Avx2 ? 32 : 16;
 
 template <class Scalar, int Width>
 struct VectorOf {

@@ -119,7 +119,7 @@ class MapFilter {
    public:
     void rebuild(const SilhouetteView<CameraType>& view, const Settings& settings, Threads threads) {
       const Mask& observed = *view.observed;
-      to_observed_.rebuild(observed, MaskPart::liquid, threads);
+      to_observed_.rebuild(observed, MaskPart::Liquid, threads);
       unexplained_ = (observed >= 128 && *view.predicted < 128)
                          .select(Mask::Constant(observed.rows(), observed.cols(), mask_liquid),
                                  Mask::Zero(observed.rows(), observed.cols()));

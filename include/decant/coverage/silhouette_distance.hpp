@@ -17,7 +17,7 @@
 namespace decant {
 
 /// Which pixels of a mask a distance leads to.
-enum class MaskPart { liquid, background };
+enum class MaskPart { Liquid, Background };
 
 /// The exact Euclidean distance transform: for every pixel the distance to the nearest pixel of the mask's liquid (or
 /// of its background), centre to centre, in time linear in the number of pixels. First the nearest such pixel within
@@ -28,7 +28,7 @@ class SilhouetteDistance {
  public:
   /// Allocates only if the mask is larger, or there are more threads, than ever before; results do not depend on the
   /// number of threads. @param mask up to 32768 x 32768 pixels; bytes as is_liquid reads them.
-  void rebuild(const ConstMaskView& mask, MaskPart part = MaskPart::liquid, Threads threads = {}) noexcept {
+  void rebuild(const ConstMaskView& mask, MaskPart part = MaskPart::Liquid, Threads threads = {}) noexcept {
     if (distance_.rows() != mask.rows() || distance_.cols() != mask.cols()) {
       distance_.resize(mask.rows(), mask.cols());
       nearest_.resize(mask.rows(), mask.cols());
@@ -69,7 +69,7 @@ class SilhouetteDistance {
 
   // nearest_ holds rows until lower_envelope turns them into pixels; -1 where a column is empty.
   void nearest_in_columns(const ConstMaskView& mask, MaskPart part, Index begin, Index end) noexcept {
-    const bool wanted = part == MaskPart::liquid;
+    const bool wanted = part == MaskPart::Liquid;
     const Index rows = mask.rows(), columns = mask.cols();
     const Index stride = mask.outerStride();
     std::int32_t* const nearest = nearest_.data();

@@ -148,7 +148,7 @@ class Dfsph {
   }
 
  private:
-  enum class Flag : std::uint8_t { no, yes };  // vector<bool> shares bytes between threads
+  enum class Flag : std::uint8_t { No, Yes };  // vector<bool> shares bytes between threads
 
   static constexpr Scalar contact_room = Scalar(0.1), loose_room = Scalar(0.2);  ///< of rest density
   static constexpr Scalar largest_correction = Scalar(0.05);                     ///< of rest density, per sub-step
@@ -194,7 +194,7 @@ class Dfsph {
     velocities_to_records(step);
     const Scalar tolerated = collision_threshold * step.rest_density;
     return flags_.over(
-               step.fluid.size(), step.threads, Flag::no,
+               step.fluid.size(), step.threads, Flag::No,
                [&](Index begin, Index end) {
                  bool any = false;
                  for (Index i = begin; i < end; ++i) {
@@ -205,9 +205,9 @@ class Dfsph {
                    offset_[own] = change_[own] - (room > 0 ? tolerated + room : std::max(tolerated + room, Scalar(0)));
                    any = any || offset_[own] > 0;
                  }
-                 return any ? Flag::yes : Flag::no;
+                 return any ? Flag::Yes : Flag::No;
                },
-               [](Flag a, Flag b) { return std::max(a, b); }) == Flag::yes;
+               [](Flag a, Flag b) { return std::max(a, b); }) == Flag::Yes;
   }
 
   template <class Step>

@@ -22,16 +22,16 @@ namespace decant {
 
 /// How much.
 struct FillAmount {
-  enum class Kind { fraction, volume, level };
+  enum class Kind { Fraction, Volume, Level };
   Kind kind;
   double value;
 
   /// Of the volume below the rim, 0 .. 1.
-  static FillAmount fraction(double share) { return {Kind::fraction, share}; }
+  static FillAmount fraction(double share) { return {Kind::Fraction, share}; }
   /// [m^3], at most what the container holds.
-  static FillAmount volume(double cubic_metres) { return {Kind::volume, cubic_metres}; }
+  static FillAmount volume(double cubic_metres) { return {Kind::Volume, cubic_metres}; }
   /// Height of the free surface above the cavity's lowest point [m].
-  static FillAmount level(double height) { return {Kind::level, height}; }
+  static FillAmount level(double height) { return {Kind::Level, height}; }
 };
 
 /// What came of it.
@@ -146,13 +146,13 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   report.capacity = cavity.volume();
   double volume = amount.value;
   switch (amount.kind) {
-    case FillAmount::Kind::fraction:
+    case FillAmount::Kind::Fraction:
       expects(amount.value >= 0 && amount.value <= 1, name + "fraction", "0 .. 1", amount.value);
       volume = amount.value * report.capacity;
       break;
-    case FillAmount::Kind::volume:
+    case FillAmount::Kind::Volume:
       break;
-    case FillAmount::Kind::level:
+    case FillAmount::Kind::Level:
       expects(amount.value >= 0 && amount.value <= cavity.rim_height() - cavity.bottom_height(), name + "level [m]",
               "between 0 and the rim", amount.value);
       volume = cavity.volume_below(cavity.bottom_height() + amount.value);
@@ -182,7 +182,7 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   };
   const auto before = simulator.snapshot();
   place(count);
-  if (amount.kind == FillAmount::Kind::level && count > 0) {
+  if (amount.kind == FillAmount::Kind::Level && count > 0) {
     // The settled surface tells how much is missing; each new count lies between those known to be too few and too
     // many.
     Index too_few = 0, too_many = most + 1;

@@ -14,7 +14,7 @@ namespace decant {
 struct Liquid {
   double density = 998.2;                ///< [kg/m^3], > 0
   double dynamic_viscosity = 1.0016e-3;  ///< mu [Pa s], >= 0
-  double surface_tension = 0.07275;      ///< sigma [N/m], >= 0
+  double surface_tension = 0.07274;      ///< sigma [N/m], >= 0
 
   /// nu = mu / rho [m^2/s].
   double kinematic_viscosity() const { return dynamic_viscosity / density; }
@@ -30,22 +30,27 @@ inline void validate(const Liquid& liquid) {
           ">= 0 and < 100", liquid.surface_tension);
 }
 
-/// Real liquids at 20 degrees Celsius; values as commonly tabulated, with the works that treat them. Honey varies by a
-/// factor of ten with its water content; milk with its fat.
+/// Real liquids at 20 degrees Celsius and 1 bar. Water and glycerol are as their sources have them. The others differ
+/// from bottle to bottle: their values are typical ones, rounded, in the range of what the works named measured.
 namespace liquids {
 
-/// IAPWS formulations (density, viscosity R12-08, surface tension R1-76).
-inline constexpr Liquid water{998.2, 1.0016e-3, 0.07275};
-/// Olive oil: density and viscosity after Noureddini et al. 1992 (J. Am. Oil Chem. Soc. 69), tension after Sahasrabudhe
-/// et al. 2017 (Int. J. Food Prop. 20).
+/// IAPWS: density R6-95, viscosity R12-08, surface tension R1-76, each evaluated at 293.15 K.
+inline constexpr Liquid water{998.2, 1.0016e-3, 0.07274};
+/// Typical: Coupland and McClements 1997 (J. Am. Oil Chem. Soc. 74:1559) compile density and viscosity of edible oils,
+/// Sahasrabudhe et al. 2017 (Int. J. Food Prop. 20) measure the tension.
 inline constexpr Liquid olive_oil{911.0, 0.084, 0.0320};
-/// Segur and Oberstar 1951 (Ind. Eng. Chem. 43) for the viscosity; CRC Handbook for density and tension.
-inline constexpr Liquid glycerol{1261.3, 1.412, 0.0634};
-/// Clover honey of 17 % water: density and viscosity after Yanniotis et al. 2006 (J. Food Eng. 72), tension after
-/// Oroian 2013 (J. Food Eng. 119).
-inline constexpr Liquid honey{1420.0, 10.0, 0.0605};
-/// Whole milk: Walstra, Wouters, Geurts 2006 (Dairy Science and Technology).
-inline constexpr Liquid milk{1030.0, 2.1e-3, 0.0470};
+/// Free of water; a hundredth of water makes it a fifth thinner. Viscosity: Segur and Oberstar 1951 (Ind. Eng. Chem.
+/// 43:2117, table of viscosities, 100 %). Density and tension: CRC Handbook of Chemistry and Physics, tables of organic
+/// compounds and of surface tensions.
+inline constexpr Liquid glycerol{1261.3, 1.410, 0.0634};
+/// Typical of liquid honey of 17 to 18 % water, after White 1975 (in Crane, Honey: A Comprehensive Survey, chapter 5):
+/// clover honey of 16 % has 19 Pa s, each further per cent takes off a third. Tension: of honeys, 0.05 to 0.06 (Oroian
+/// 2013, J. Food Eng. 119:167, measures several).
+inline constexpr Liquid honey{1420.0, 10.0, 0.060};
+/// Typical of whole milk of 4 % fat; Sherbon 1988 (in Wong et al., Fundamentals of Dairy Chemistry, 3rd edition,
+/// chapter 8) reviews density and viscosity. Tension: Bertsch 1983 (J. Dairy Res. 50:259, equation of the summary,
+/// scatter 0.002); of homogenised milk some measure 0.045.
+inline constexpr Liquid milk{1030.0, 2.1e-3, 0.0524};
 
 }  // namespace liquids
 

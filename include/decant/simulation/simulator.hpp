@@ -78,7 +78,7 @@ class Simulator {
   /// Adds a rigid body; its wall integrals are prepared here, which takes time for meshes. Liquid that is where the
   /// body is put is pushed out of its material. Throws std::invalid_argument for a mesh that is empty, not finite or of
   /// the wrong size; flaws that it can live with are in bodies()[body].warnings, see also mesh_report.
-  BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::free) {
+  BodyId add_body(std::string name, BodyShape shape, PoseTrack motion = {}, Slip slip = Slip::Free) {
     const BodyId body = bodies_.template add<Kernel>(std::move(name), std::move(shape), std::move(motion), slip,
                                                      smoothing_length_, settings_.spacing, settings_.threads);
     bodies_.set_interval(time_, 0);
@@ -180,21 +180,21 @@ class Simulator {
   [[nodiscard]] StepReport step(double frame_time) noexcept {
     StepReport report;
     if (!(frame_time >= 0) || !std::isfinite(frame_time)) {
-      report.status = StepStatus::bad_time_step;
+      report.status = StepStatus::BadTimeStep;
       return report;
     }
     remember();
     const double end = time_ + frame_time;
     bool converged = true;
-    while (report.status == StepStatus::ok && time_ < end) {
+    while (report.status == StepStatus::Ok && time_ < end) {
       if (report.sub_steps >= settings_.most_sub_steps) {
-        report.status = StepStatus::too_many_steps;
+        report.status = StepStatus::TooManySteps;
         break;
       }
       const double left = end - time_;
       double time_step = choose_step(left, report.sub_steps);
       if (time_step <= 0) {
-        report.status = fluid_finite() ? StepStatus::too_many_steps : StepStatus::non_finite;
+        report.status = fluid_finite() ? StepStatus::TooManySteps : StepStatus::NonFinite;
         break;
       }
       const double reached = time_step < left ? time_ + time_step : end;
@@ -203,16 +203,16 @@ class Simulator {
       time_ = reached;
       ++report.sub_steps;
     }
-    if (report.status == StepStatus::ok) {
+    if (report.status == StepStatus::Ok) {
       report.non_finite = count_non_finite();
       if (report.non_finite > 0) {
-        report.status = StepStatus::non_finite;
+        report.status = StepStatus::NonFinite;
       }
     }
-    if (report.status != StepStatus::ok) {
+    if (report.status != StepStatus::Ok) {
       recall();
     } else if (!converged) {
-      report.status = StepStatus::not_converged;
+      report.status = StepStatus::NotConverged;
     }
     lost_ += report.advanced() ? report.lost : 0;
     report.lost = lost_;
@@ -581,8 +581,7 @@ class Simulator {
     const Scalar dt = static_cast<Scalar>(time_step);
     parallel_for(fluid_.size(), settings_.threads,
                  [&](Index i) { fluid_.position.col(i) += dt * fluid_.velocity.col(i) + shift_.col(i); });
-    const GuardReport guard =
-        bodies_.guard(before_, time_step, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    const GuardReport guard = bodies_.guard(before_, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
     report.guarded += guard.slid + guard.stopped;
     report.lost += guard.lost;
     if constexpr (Domain::periodic) {
@@ -593,7 +592,7 @@ class Simulator {
 
   /// The guard for moves that are not motion: from before_, at walls that stand.
   Index keep_on_sides() noexcept {
-    const GuardReport guard = bodies_.guard(before_, 0, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
+    const GuardReport guard = bodies_.guard(before_, 0.1 * settings_.spacing, settings_.threads, walls_, fluid_);
     return guard.slid + guard.stopped + guard.lost;
   }
 

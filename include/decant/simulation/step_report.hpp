@@ -13,20 +13,20 @@
 namespace decant {
 
 enum class StepStatus {
-  ok,
-  not_converged,   ///< the step was taken, but the pressure solver stopped short of its tolerance in some sub-step
-  bad_time_step,   ///< the frame time is not a finite number >= 0; state unchanged
-  too_many_steps,  ///< something moves too fast for the limit on sub-steps; state unchanged
-  non_finite,      ///< a position or velocity became infinite or NaN; state unchanged
+  Ok,
+  NotConverged,  ///< the step was taken, but the pressure solver stopped short of its tolerance in some sub-step
+  BadTimeStep,   ///< the frame time is not a finite number >= 0; state unchanged
+  TooManySteps,  ///< something moves too fast for the limit on sub-steps; state unchanged
+  NonFinite,     ///< a position or velocity became infinite or NaN; state unchanged
 };
 
 constexpr std::string_view to_string(StepStatus status) {
   switch (status) {
-    case StepStatus::ok: return "ok";
-    case StepStatus::not_converged: return "not converged";
-    case StepStatus::bad_time_step: return "bad time step";
-    case StepStatus::too_many_steps: return "too many sub-steps";
-    case StepStatus::non_finite: return "non-finite";
+    case StepStatus::Ok: return "ok";
+    case StepStatus::NotConverged: return "not converged";
+    case StepStatus::BadTimeStep: return "bad time step";
+    case StepStatus::TooManySteps: return "too many sub-steps";
+    case StepStatus::NonFinite: return "non-finite";
   }
   return "unknown";
 }
@@ -74,7 +74,7 @@ class ContentsList {
 
 /// One frame. Sums and maxima are over the frame's sub-steps.
 struct StepReport {
-  StepStatus status = StepStatus::ok;
+  StepStatus status = StepStatus::Ok;
   int sub_steps = 0;
   int density_iterations = 0;
   int divergence_iterations = 0;
@@ -85,11 +85,11 @@ struct StepReport {
   Index particles = 0;
   Index guarded = 0;               ///< steps that swept contact had to bend
   Index lost = 0;                  ///< particles that passed a wall because bodies left them no room, since the start
-  Index non_finite = 0;            ///< particles with a non-finite position or velocity (status non_finite)
+  Index non_finite = 0;            ///< particles with a non-finite position or velocity (status NonFinite)
   ContentsList contents{};         ///< of the containers that are watched, at the end of the frame
 
   /// True if the frame was simulated; false if the state is unchanged.
-  bool advanced() const { return status == StepStatus::ok || status == StepStatus::not_converged; }
+  bool advanced() const { return status == StepStatus::Ok || status == StepStatus::NotConverged; }
 };
 
 }  // namespace decant

@@ -105,7 +105,7 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
     fluid.resize(count);
     fluid.position = inside.colwise() + step;
     fluid.velocity.setZero();
-    const GuardReport report = bodies.guard(inside, 1e-3, clearance, {1}, walls, fluid);
+    const GuardReport report = bodies.guard(inside, clearance, {1}, walls, fluid);
     passed += static_cast<double>(report.lost);
     for (Index i = 0; i < count; ++i) {
       const Point from = inside.col(i), to = fluid.position.col(i), wanted = from + step;

@@ -127,7 +127,7 @@ LooseLiquid<Kernel> loose_ball(typename Kernel::Scalar spacing, int radius_in_sp
 }
 
 /// Which of the momenta a force claims to keep.
-enum class Keeps { neither, linear, linear_and_angular };
+enum class Keeps { Neither, Linear, LinearAndAngular };
 
 /// Tries the laws of a force on a small ball of liquid.
 /// @param keeps what the force's docstring promises of a free drop.
@@ -172,11 +172,11 @@ std::vector<Law> force_laws(Force force, Keeps keeps) {
       {"the same bits with 1, 2 and 4 threads (numbers of threads that differ)", threads_differ, 0},
   };
   // each particle's sum carries rounding of some thirty terms, larger than itself by the terms' cancellation
-  if (keeps != Keeps::neither) {
+  if (keeps != Keeps::Neither) {
     laws.push_back(
         {"linear momentum is kept, relative to the sum of all forces", momentum.norm() / size, 100 * rounding});
   }
-  if (keeps == Keeps::linear_and_angular) {
+  if (keeps == Keeps::LinearAndAngular) {
     laws.push_back(
         {"angular momentum is kept, relative to the sum of all torques", angular.norm() / lever, 100 * rounding});
   }

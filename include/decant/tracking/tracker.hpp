@@ -68,28 +68,28 @@ struct TrackerFrame {
 };
 
 enum class FrameStatus {
-  ok,
-  uncorrected,   ///< time went on, but there was no mask that could be believed
-  late,          ///< the frame is not newer than the one before: nothing was done
-  gap,           ///< the frame is later than longest_gap, or its time is not finite: nothing was done
-  bad_input,     ///< a body or camera that does not exist, a pose that is none, or a mask of another size: nothing was
-                 ///< done
-  model_failed,  ///< the simulation could not take the step: nothing was done
+  Ok,
+  Uncorrected,  ///< time went on, but there was no mask that could be believed
+  Late,         ///< the frame is not newer than the one before: nothing was done
+  Gap,          ///< the frame is later than longest_gap, or its time is not finite: nothing was done
+  BadInput,     ///< a body or camera that does not exist, a pose that is none, or a mask of another size: nothing was
+                ///< done
+  ModelFailed,  ///< the simulation could not take the step: nothing was done
 };
 
 constexpr std::string_view to_string(FrameStatus status) {
   switch (status) {
-    case FrameStatus::ok:
+    case FrameStatus::Ok:
       return "ok";
-    case FrameStatus::uncorrected:
+    case FrameStatus::Uncorrected:
       return "uncorrected";
-    case FrameStatus::late:
+    case FrameStatus::Late:
       return "late";
-    case FrameStatus::gap:
+    case FrameStatus::Gap:
       return "gap";
-    case FrameStatus::bad_input:
+    case FrameStatus::BadInput:
       return "bad_input";
-    case FrameStatus::model_failed:
+    case FrameStatus::ModelFailed:
       return "model_failed";
   }
   return "";
@@ -97,7 +97,7 @@ constexpr std::string_view to_string(FrameStatus status) {
 
 /// How a frame went.
 struct FrameReport {
-  FrameStatus status = FrameStatus::ok;
+  FrameStatus status = FrameStatus::Ok;
   double time = 0;            ///< of the model, afterwards [s]
   Overlap prior{};            ///< simulation against cleaned masks before the correction, all cameras together
   Overlap posterior{};        ///< and after it
@@ -106,7 +106,7 @@ struct FrameReport {
   double relocated_volume = 0;  ///< mass that was taken from one place to another [m^3]
   double physics_ms = 0, drawing_ms = 0, correction_ms = 0, relaxation_ms = 0;  ///< wall time [ms]
 
-  bool advanced() const noexcept { return status == FrameStatus::ok || status == FrameStatus::uncorrected; }
+  bool advanced() const noexcept { return status == FrameStatus::Ok || status == FrameStatus::Uncorrected; }
 };
 
 /// A liquid model, cameras, and a corrector, stepped together. Not to be called from several threads at once; copies
@@ -168,15 +168,15 @@ class Tracker {
     report.time = model_.time();
     const double duration = frame.time - model_.time();
     if (!std::isfinite(frame.time) || duration > settings_.longest_gap) {
-      report.status = FrameStatus::gap;
+      report.status = FrameStatus::Gap;
       return report;
     }
     if (duration < 0 || (duration == 0 && started_)) {
-      report.status = FrameStatus::late;
+      report.status = FrameStatus::Late;
       return report;
     }
     if (!usable(frame)) {
-      report.status = FrameStatus::bad_input;
+      report.status = FrameStatus::BadInput;
       return report;
     }
     if (duration > 0) {
@@ -186,7 +186,7 @@ class Tracker {
       }
       step_report_ = model_.step(duration);
       if (!step_report_.advanced()) {
-        report.status = FrameStatus::model_failed;
+        report.status = FrameStatus::ModelFailed;
         return report;
       }
     }
@@ -195,7 +195,7 @@ class Tracker {
     look(frame, report);
     report.prior = compare();
     if (views_.empty()) {
-      report.status = FrameStatus::uncorrected;
+      report.status = FrameStatus::Uncorrected;
     } else if (duration > 0) {
       correct(duration, report);
     }
@@ -394,7 +394,7 @@ class Tracker {
         Vector3<double> end_in_body = body_from_world * end;
         const SweptResult result =
             keep_on_side(surface, body_from_world * start, end_in_body, 0.1 * static_cast<double>(model_.spacing()));
-        if (result != SweptResult::free) {
+        if (result != SweptResult::Free) {
           fluid.position.col(i) = (world_from_body * end_in_body).template cast<Scalar>();
         }
       });
