@@ -292,10 +292,11 @@ inline void add_scores(decant::HtmlReport& report, const decant::Recording& reco
   }
   report.table(table, look);
   report.paragraph(
-      "Intersection over union of the observed and the predicted silhouette: mean over frames and pooled over pixels, "
-      "after the correction; prior: mean before it; then the mean of forecasts, made by the model alone. 1 is perfect, "
-      "the best of each column is bold. The log-likelihood of all masks is given as its difference from the best "
-      "method's, " +
+      std::string("Intersection over union of the observed and the predicted silhouette: mean over frames and pooled "
+                  "over pixels, after the correction; prior: mean before it") +
+      (options.forecasts.empty() ? "" : "; then the means of forecasts that the model made by itself") +
+      ". 1 is perfect" + (results.size() > 1 ? ", the best of each column is bold" : "") +
+      ". The log-likelihood of all masks is given as its difference from the best method's, " +
       figure(best_likelihood, 1) +
       " nat. Relocated is the liquid that a corrector took from place to place, all frames together.");
 }

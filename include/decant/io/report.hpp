@@ -198,7 +198,8 @@ inline constexpr ChartShape wide_chart{"wide", 880, 310, 70, 16, 14, 48, 10, 6};
 inline constexpr ChartShape narrow_chart{"narrow", 360, 270, 54, 8, 12, 46, 5, 5};
 
 inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = wide_chart) {
-  const auto [kind, width, height, left, right, top, bottom, x_tick_count, y_tick_count] = shape;
+  const double width = shape.width, height = shape.height, left = shape.left, right = shape.right, top = shape.top,
+               bottom = shape.bottom;
   double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low, y_low = x_low, y_high = -x_low;
   for (const LineChart::Line& line : chart.lines) {
     for (std::size_t k = 0; k < line.x.size(); ++k) {
@@ -218,7 +219,7 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
     y_low = std::isfinite(y) ? std::min(y_low, y) : y_low;
     y_high = std::isfinite(y) ? std::max(y_high, y) : y_high;
   }
-  const Ticks x_ticks(x_low, x_high, x_tick_count), y_ticks(y_low, y_high, y_tick_count);
+  const Ticks x_ticks(x_low, x_high, shape.x_ticks), y_ticks(y_low, y_high, shape.y_ticks);
   if (!(x_high > x_low)) {
     x_low = x_ticks.first;
     x_high = x_ticks.last;
@@ -229,7 +230,7 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
   };
   const auto point = [](double value) { return fixed_text(value, 1); };
 
-  std::string svg = std::string("<svg class=\"chart ") + kind + "\" viewBox=\"0 0 " + fixed_text(width, 0) + " " +
+  std::string svg = std::string("<svg class=\"chart ") + shape.kind + "\" viewBox=\"0 0 " + fixed_text(width, 0) + " " +
                     fixed_text(height, 0) + "\" role=\"img\" aria-label=\"" + html_text(chart.title) +
                     "\" data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
                     "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\">\n";
@@ -458,7 +459,7 @@ img{max-width:100%}
 .grid{stroke:#e6eaef}.zero{stroke:#9aa5b1}.line{fill:none;stroke-width:1.6;stroke-linejoin:round}
 .strong{stroke-width:3}.now{stroke:#1c232b;stroke-dasharray:2 3}
 .narrow{display:none}
-.screen{background:#f3f5f7;border:1px solid #dfe4ea;border-radius:4px;text-align:center;line-height:0}
+.screen{border:1px solid #dfe4ea;border-radius:4px;text-align:center;line-height:0}
 .screen img{max-height:65vh;object-fit:contain}
 .bar{display:flex;gap:.8em;align-items:center;margin:.6em 0}.bar[hidden]{display:none}
 .bar input{flex:1;min-width:6em;accent-color:#0072b2}
