@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
 # Sees to it that everything is there that decant's own programs are built from: installs the missing apt packages
-# where it may, else says which they are and ends with status 1. Arguments: further apt packages to look for.
+# where it may, else says which they are and ends with status 1. Arguments: further apt packages to look for; `browser`
+# stands for Chromium, with which reports are tested, and which nothing stops without.
 # DECANT_DEPENDENCIES=skip in the environment leaves all this out, for machines that have things by other means.
 set -euo pipefail
 
@@ -16,15 +17,25 @@ fi
 
 missing=()
 need() { missing+=("$1"); }
+packages=()
+without_browser=false
+for package in "$@"; do
+  if [[ $package != browser ]]; then
+    packages+=("$package")
+  elif ! command -v chromium >/dev/null && ! command -v chromium-browser >/dev/null &&
+    ! command -v google-chrome >/dev/null; then
+    without_browser=true
+  fi
+done
 # tools may come from elsewhere than a package
 command -v "${CXX:-c++}" >/dev/null || need g++
 command -v cmake >/dev/null || need cmake
 command -v ninja >/dev/null || need ninja-build
-for package in libeigen3-dev libnanoflann-dev nlohmann-json3-dev libpng-dev libcli11-dev "$@"; do
+for package in libeigen3-dev libnanoflann-dev nlohmann-json3-dev libpng-dev libcli11-dev "${packages[@]}"; do
   state=$(dpkg-query --show --showformat '${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $state == installed ]] || need "$package"
 done
-if ((${#missing[@]} == 0)); then
+if ((${#missing[@]} == 0)) && [[ $without_browser == false ]]; then
   exit 0
 fi
 
@@ -33,18 +44,32 @@ if ((EUID != 0)); then
   as_root=(sudo)
   # without a terminal nobody can type a password
   if ! command -v sudo >/dev/null || { [[ ! -t 0 || -n ${CI:-} ]] && ! sudo -n true 2>/dev/null; }; then
+    if ((${#missing[@]} == 0)); then
+      echo "No browser: reports are not tested in one. To have them tested: sudo apt-get install chromium" >&2
+      exit 0
+    fi
     echo "These packages are missing, and installing them takes an administrator:" >&2
     echo "  sudo apt-get install ${missing[*]}" >&2
     exit 1
   fi
 fi
-echo "Installing ${missing[*]}"
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-install=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}")
+update() { "${as_root[@]}" apt-get update; }
+install() { "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"; }
 # the list of packages may be out of date or empty
-if ! { "${as_root[@]}" apt-get update && "${install[@]}"; } >"$log" 2>&1; then
-  tail -n 15 "$log" >&2
-  echo "Installing failed. Missing: ${missing[*]}" >&2
-  exit 1
+if ((${#missing[@]} > 0)); then
+  echo "Installing ${missing[*]}"
+  if ! { update && install "${missing[@]}"; } >"$log" 2>&1; then
+    tail -n 15 "$log" >&2
+    echo "Installing failed. Missing: ${missing[*]}" >&2
+    exit 1
+  fi
+fi
+if [[ $without_browser == true ]]; then
+  echo "Installing chromium"
+  # Ubuntu has it as a snap only, which not every machine can run
+  if ! { update && install chromium; } >"$log" 2>&1; then
+    echo "Installing chromium failed: reports are not tested in a browser." >&2
+  fi
 fi

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Tracks the liquid of a recording and scores how well:
-//   track RECORDING_DIR --corrector open_loop,default --json OUT.json
+//   track RECORDING_DIR --corrector open_loop,default --json OUT.json --report OUT.html
 // Exit status 0: done; 1: a method failed on the way; 2: the recording, a file or an argument is wrong.
 
 #include <cstdio>
@@ -28,6 +28,7 @@
 #include <decant/simulation/parts.hpp>
 
 #include "support/result_file.hpp"
+#include "support/tracking_report.hpp"
 #include "support/tracking_run.hpp"
 
 namespace {
@@ -87,7 +88,7 @@ nlohmann::json json_of(const example::TrackingResult& result, const decant::Reco
 }  // namespace
 
 int main(int count, char** values) {
-  std::string folder, json_file;
+  std::string folder, json_file, report_file;
   std::vector<std::string> names{"open_loop", "default"};
   example::TrackingOptions options;
   options.forecasts = {0.25, 0.5, 1};
@@ -104,6 +105,7 @@ int main(int count, char** values) {
       ->delimiter(',')
       ->check(CLI::IsMember(known));
   app.add_option("--json", json_file, "writes the scores");
+  app.add_option("--report", report_file, "writes a page with charts and silhouettes, for a browser");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--threads", options.threads, "0: all")->check(CLI::Range(0, 1024));
   app.add_flag("--no-forecasts", without_forecasts, "leaves out the scores ahead, which double the time");
@@ -113,14 +115,19 @@ int main(int count, char** values) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   options.spacing = 1e-3 * spacing_mm;
+  options.keep_overlays = !report_file.empty();
   if (without_forecasts) {
     options.forecasts.clear();
   }
   nlohmann::json json;
+  std::vector<example::NamedResult> results;
   bool failed = false;
   try {
     if (!json_file.empty()) {
       example::expect_writable(json_file);
+    }
+    if (!report_file.empty()) {
+      example::expect_writable(report_file);
     }
     const decant::Recording recording = decant::read_recording(folder);
     const Model model = example::model_of<decant::DefaultParts<>>(recording, options);
@@ -132,7 +139,7 @@ int main(int count, char** values) {
           continue;
         }
         decant::Progress progress(name, static_cast<double>(recording.frames));
-        const example::TrackingResult result =
+        example::TrackingResult result =
             run(recording, model, options, [&](std::size_t done) { progress.update(static_cast<double>(done)); });
         progress.finish();
         json["correctors"][name] = json_of(result, recording, options.forecasts);
@@ -144,10 +151,14 @@ int main(int count, char** values) {
                     result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
                     static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
         std::fflush(stdout);
+        results.push_back({name, std::move(result)});
       }
     }
     if (!json_file.empty()) {
       decant::detail::write_text_file(json_file, json.dump(1));
+    }
+    if (!report_file.empty()) {
+      example::write_tracking_report(report_file, recording, options, results);
     }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <limits>
@@ -16,6 +17,7 @@
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/image.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/contents.hpp>
 #include <decant/simulation/fill.hpp>
@@ -30,6 +32,17 @@ struct TrackingOptions {
   std::vector<double> forecasts{};  ///< how far ahead [s]
   int frames_between_forecasts = 5;
   int threads = 0;
+  bool keep_overlays = false;  ///< for reports; takes some MB of memory per hundred frames
+};
+
+/// Observed against predicted silhouette of the first camera in one frame: the part of the image that has any liquid.
+struct Overlay {
+  static constexpr std::uint8_t observed = 1, predicted = 2;  ///< bits of a label; both: 3
+
+  decant::Image<std::uint8_t> label{};
+  decant::Index top = 0, left = 0;            ///< of the label in the image [px]
+  bool has_mask = false;                      ///< false: nothing was seen in this frame
+  bool counts = false, prior_counts = false;  ///< whether the frame has enough liquid for OverlapScore's mean
 };
 
 /// One method on one recording.
@@ -42,10 +55,39 @@ struct TrackingResult {
   std::vector<std::vector<double>> volume_ml;  ///< per body and frame
   double relocated_ml = 0;
   double physics_ms = 0, drawing_ms = 0, correction_ms = 0, relaxation_ms = 0;  ///< all frames together
+  std::vector<Overlay> overlays;  ///< per frame, where the options ask for them and there is a camera
   std::size_t frames = 0;
   decant::Index particles = 0;
   std::string status = "ok";
 };
+
+/// @param seen nothing where the camera saw nothing in this frame.
+inline Overlay overlay_of(const decant::Mask& predicted, const decant::Mask* seen) {
+  decant::Image<std::uint8_t> label =
+      predicted.unaryExpr([](std::uint8_t p) { return decant::is_liquid(p) ? Overlay::predicted : std::uint8_t{0}; });
+  if (seen != nullptr) {
+    label += seen->unaryExpr([](std::uint8_t o) { return decant::is_liquid(o) ? Overlay::observed : std::uint8_t{0}; });
+  }
+  decant::Index top = label.rows(), bottom = 0, left = label.cols(), right = 0;
+  for (decant::Index row = 0; row < label.rows(); ++row) {
+    for (decant::Index column = 0; column < label.cols(); ++column) {
+      if (label(row, column) != 0) {
+        top = std::min(top, row);
+        bottom = row + 1;
+        left = std::min(left, column);
+        right = std::max(right, column + 1);
+      }
+    }
+  }
+  Overlay overlay;
+  overlay.has_mask = seen != nullptr;
+  if (bottom > top) {
+    overlay.label = label.block(top, left, bottom - top, right - left);
+    overlay.top = top;
+    overlay.left = left;
+  }
+  return overlay;
+}
 
 inline decant::DistortedPinholeCamera camera_of(const decant::recording::View& view, int width, int height) {
   const auto& d = view.distortion;
@@ -143,6 +185,14 @@ TrackingResult track_recording(
     result.prior.add(report.prior);
     if (report.posterior.compared_px > 0) {
       result.log_likelihood += report.log_likelihood;
+    }
+    if (options.keep_overlays && !recording.cameras.empty()) {
+      const bool has_mask = !masks.empty() && masks.front().camera == 0;
+      Overlay overlay = overlay_of(tracker.predicted(0), has_mask ? &tracker.observed(0) : nullptr);
+      const auto least = OverlapScoreSettings{}.least_union_px;
+      overlay.counts = report.posterior.compared_px > 0 && report.posterior.union_px() >= least;
+      overlay.prior_counts = report.prior.compared_px > 0 && report.prior.union_px() >= least;
+      result.overlays.push_back(std::move(overlay));
     }
     result.relocated_ml += 1e6 * report.relocated_volume;
     result.physics_ms += report.physics_ms;

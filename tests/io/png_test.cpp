@@ -3,6 +3,7 @@
 
 #include <decant/io/png.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -66,6 +67,39 @@ TEST_CASE("png: a picture survives encoding and decoding") {
   REQUIRE(png_image_finish_read(&image, nullptr, rgb.data(), 0, nullptr) != 0);
   CHECK(rgb == picture.rgb);
   CHECK(rgb[6] == 10);
+}
+
+TEST_CASE("png: pictures of few colours take few bits and keep their colours") {
+  for (const int count : {1, 2, 4, 6, 16, 200}) {
+    INFO(count);
+    decant::PalettePicture picture;
+    picture.index.resize(3, 70);
+    for (int k = 0; k < picture.index.size(); ++k) {
+      picture.index.data()[k] = static_cast<std::uint8_t>((7 * k) % count);
+    }
+    for (int k = 0; k < count; ++k) {
+      picture.colours.push_back({static_cast<std::uint8_t>(k), static_cast<std::uint8_t>(255 - k), 77});
+    }
+    const std::string bytes = decant::png_bytes(picture);
+    const decant::PngHeader header = decant::parse_png_header(bytes, "p.png");
+    CHECK(header.colour_type == PNG_COLOR_TYPE_PALETTE);
+    CHECK(header.bit_depth == (count <= 2 ? 1 : count <= 4 ? 2 : count <= 16 ? 4 : 8));
+    decant::Picture read = decant::parse_png_picture(bytes, "p.png");
+    REQUIRE(read.width == 70);
+    REQUIRE(read.height == 3);
+    bool equal = true;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 70; ++column) {
+        equal = equal && std::equal(read.at(row, column), read.at(row, column) + 3,
+                                    picture.colours[picture.index(row, column)].begin());
+      }
+    }
+    CHECK(equal);
+  }
+  decant::PalettePicture wrong{decant::Image<std::uint8_t>::Constant(1, 1, 2), {{0, 0, 0}, {1, 1, 1}}};
+  CHECK_THROWS_WITH(decant::png_bytes(wrong), "PalettePicture: index must be less than the number of colours, got 2");
+  wrong.colours.clear();
+  CHECK_THROWS_WITH(decant::png_bytes(wrong), "PalettePicture: number of colours must be 1 to 256, got 0");
 }
 
 TEST_CASE("png: sizes are checked") {

@@ -60,14 +60,27 @@ TEST_CASE("report: a chart draws each point where it belongs") {
       "height [mm]",
       {{"a", {0, 1, 2, 3, 4}, {0, 10, std::nan(""), 10, 0}, false}, {"b<", {0, 4}, {5, 5}, true}}};
   const std::string svg = decant::detail::chart_svg(chart);
-  // x from 70 to 864, y from 282 (0) up to 34 (10); the gap starts a new stroke
-  CHECK(svg.find("d=\"M70.0 282.0L268.5 34.0M665.5 34.0L864.0 282.0\"") != std::string::npos);
-  CHECK(svg.find("d=\"M70.0 158.0L864.0 158.0\"") != std::string::npos);
-  CHECK(svg.find("b&lt;") != std::string::npos);
+  // x from 70 to 864, y from 262 (0) up to 14 (10); the gap starts a new stroke
+  CHECK(svg.find("d=\"M70.0 262.0L268.5 14.0M665.5 14.0L864.0 262.0\"") != std::string::npos);
+  CHECK(svg.find("d=\"M70.0 138.0L864.0 138.0\"") != std::string::npos);
+  CHECK(svg.find("data-name=\"b&lt;\"") != std::string::npos);
+  CHECK(decant::detail::chart_legend(chart).find("</svg>b&lt;</span>") != std::string::npos);
   CHECK(svg.find("time [s]") != std::string::npos);
   CHECK(svg.find("height [mm]") != std::string::npos);
   CHECK(svg.find("nan") == std::string::npos);
   CHECK(decant::detail::chart_svg({"empty", "x", "y", {}}).find("nan") == std::string::npos);
+}
+
+TEST_CASE("report: an axis shows the numbers that it is asked to show") {
+  decant::LineChart chart{"t", "x", "y", {{"a", {5, 6}, {0.6, 0.7}, false}}};
+  CHECK(decant::detail::chart_svg(chart).find(">0.0<") == std::string::npos);
+  chart.y_within = {0, 1, std::nan("")};
+  const std::string svg = decant::detail::chart_svg(chart);
+  CHECK(svg.find(">0.0<") != std::string::npos);
+  CHECK(svg.find(">1.0<") != std::string::npos);
+  CHECK(svg.find("data-high=\"6\"") != std::string::npos);
+  chart.x_within = {9};
+  CHECK(decant::detail::chart_svg(chart).find("data-high=\"9\"") != std::string::npos);
 }
 
 TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
@@ -81,7 +94,12 @@ TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
   report.chart({"chart", "x", "y", {{"line", {0, 1}, {0, 1}, false}}});
   decant::Picture picture(2, 2);
   report.picture(picture, "two by two");
-  report.film({{0.0, decant::png_bytes(picture)}, {0.5, decant::png_bytes(picture)}}, "film");
+  report.legend({{"c&d", {1, 2, 3}}});
+  report.grid({"g<"}, {{"row>", {{decant::png_bytes(picture), "\"cell\"", decant::HtmlReport::film_link(1, 2)}}}},
+              "i&j");
+  report.films({{"one</script>", {{0.0, decant::png_bytes(picture), "\"n\\"}, {0.5, decant::png_bytes(picture)}}},
+                {"two", {{0.0, decant::png_bytes(picture)}, {0.5, decant::png_bytes(picture)}}}},
+               "film");
   report.write(folder.path() / "r.html");
   const std::string html = decant::detail::read_text_file(folder.path() / "r.html", 1 << 20);
   CHECK(html.find("<h1>a &lt;b&gt; &amp; c</h1>") != std::string::npos);
@@ -89,6 +107,12 @@ TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
   CHECK(html.find("<p>&quot;quoted&quot; &amp; &lt;script&gt;</p>") != std::string::npos);
   CHECK(html.find("<td>x&lt;y</td><td>1</td>") != std::string::npos);
   CHECK(html.find("const times = [0.000,0.500];") != std::string::npos);
+  CHECK(html.find("{name: \"one\\u003c/script>\", notes: [\"\\u0022n\\u005c\",\"\"]") != std::string::npos);
+  CHECK(html.find("<option>one&lt;/script&gt;</option><option>two</option>") != std::string::npos);
+  CHECK(html.find("rgb(1,2,3)\"></i>c&amp;d</span>") != std::string::npos);
+  CHECK(html.find("<th>g&lt;</th>") != std::string::npos);
+  CHECK(html.find("row&gt;, &quot;cell&quot;") != std::string::npos);
+  CHECK(html.find("<a href=\"#film=1&amp;picture=2\">") != std::string::npos);
   CHECK(html.find("data:image/png;base64,iVBORw0KGgo") != std::string::npos);
   for (const char* foreign : {"http:", "https:", "//cdn", "@import", "<link"}) {
     INFO(foreign);
@@ -96,5 +120,17 @@ TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
   }
   CHECK_THROWS_WITH(report.chart({"c", "x", "y", {{"line", {0, 1}, {0}, false}}}),
                     "LineChart: numbers of x and y of a line must be equal, y has, got 1");
+  CHECK_THROWS_WITH(report.films({{"a", {{0.0, "", ""}}}, {"b", {}}}, "c"),
+                    "HtmlReport: frames of each film must be as many as of the first, got 0");
   CHECK_THROWS_AS(report.write(folder.path() / "no/such/folder/r.html"), std::runtime_error);
+}
+
+TEST_CASE("report: a table has headings of groups and bold cells where it is asked to") {
+  decant::HtmlReport report("t");
+  decant::Table table({"name", "a", "b"});
+  table.add({"x", "1", "2"});
+  report.table(table, {{{"", 1}, {"both & all", 2}}, {{1, 2}}});
+  const std::string html = report.text();
+  CHECK(html.find("<td colspan=\"1\"></td><th colspan=\"2\"><span>both &amp; all</span></th>") != std::string::npos);
+  CHECK(html.find("<td>x</td><td>1</td><td class=\"bold\">2</td>") != std::string::npos);
 }

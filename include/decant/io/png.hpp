@@ -46,6 +46,12 @@ struct Picture {
   }
 };
 
+/// A picture of few colours: PNG files of such take a tenth of the room of others.
+struct PalettePicture {
+  Image<std::uint8_t> index{};                         ///< of each pixel's colour
+  std::vector<std::array<std::uint8_t, 3>> colours{};  ///< red, green, blue; 1 to 256 of them
+};
+
 /// What a PNG file says about itself before its pixels.
 struct PngHeader {
   int width = 0;        ///< [px], 1 to 16384
@@ -236,7 +242,7 @@ Image<Value> parse_png_grey(PngDecoder& decoder, std::string_view name) {
 }
 
 inline std::string encode_png(std::uint32_t format, Eigen::Index width, Eigen::Index height, const void* samples,
-                              Eigen::Index row_stride) {
+                              Eigen::Index row_stride, std::size_t colours = 0, const void* palette = nullptr) {
   expects(width >= 1 && width <= 16384, "PNG: width [px]", "1 to 16384", width);
   expects(height >= 1 && height <= 16384, "PNG: height [px]", "1 to 16384", height);
   png_image image{};
@@ -244,10 +250,11 @@ inline std::string encode_png(std::uint32_t format, Eigen::Index width, Eigen::I
   image.width = static_cast<png_uint_32>(width);
   image.height = static_cast<png_uint_32>(height);
   image.format = format;
+  image.colormap_entries = static_cast<png_uint_32>(colours);
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(size, '\0');
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, samples, static_cast<png_int_32>(row_stride),
-                                nullptr) == 0) {
+                                palette) == 0) {
     throw std::runtime_error("a PNG picture cannot be encoded: " + std::string(image.message));
   }
   bytes.resize(size);
@@ -315,6 +322,18 @@ inline std::string png_bytes(const Picture& picture) {
 /// A mask, as 8-bit grey.
 inline std::string png_bytes(const ConstImageView<std::uint8_t>& image) {
   return detail::encode_png(PNG_FORMAT_GRAY, image.cols(), image.rows(), image.data(), image.outerStride());
+}
+
+/// As few bits per pixel as the number of colours allows: 1, 2, 4 or 8. Throws std::invalid_argument where there are
+/// no colours, more than 256, or fewer than the pixels ask for.
+inline std::string png_bytes(const PalettePicture& picture) {
+  expects(!picture.colours.empty() && picture.colours.size() <= 256, "PalettePicture: number of colours", "1 to 256",
+          picture.colours.size());
+  const int highest = picture.index.size() > 0 ? picture.index.maxCoeff() : 0;
+  expects(highest < static_cast<int>(picture.colours.size()), "PalettePicture: index",
+          "less than the number of colours", highest);
+  return detail::encode_png(PNG_FORMAT_RGB_COLORMAP, picture.index.cols(), picture.index.rows(), picture.index.data(),
+                            0, picture.colours.size(), picture.colours.data());
 }
 
 /// 16-bit grey, every count as it is.

@@ -34,6 +34,8 @@ struct LineChart {
   std::string x_label;  ///< with unit, e.g. "time [s]"
   std::string y_label;
   std::vector<Line> lines;
+  std::vector<double> x_within{};  ///< numbers that the axis shows in any case, such as where a film begins and ends
+  std::vector<double> y_within{};  ///< likewise, such as 0 and 1 for a share
 };
 
 namespace detail {
@@ -56,6 +58,23 @@ inline std::string html_text(std::string_view text) {
         break;
       default:
         out += c;
+    }
+  }
+  return out;
+}
+
+/// Inside of a script's double quotes.
+inline std::string script_text(std::string_view text) {
+  constexpr char digits[] = "0123456789abcdef";
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\' || c == '<' || byte < 0x20) {  // '<' could end the script
+      out += "\\u00";
+      out += digits[byte >> 4];
+      out += digits[byte & 15U];
+    } else {
+      out += c;
     }
   }
   return out;
@@ -148,11 +167,39 @@ inline LineChart::Line thinned(const LineChart::Line& line, std::size_t bins) {
   return out;
 }
 
-inline std::string chart_svg(const LineChart& chart) {
-  constexpr double width = 880, height = 330, left = 70, right = 16, top = 34, bottom = 48;
-  // told apart also by those who do not see red against green
-  constexpr std::array<const char*, 7> colors = {"#1f5fbf", "#d9730d", "#1a8a5a", "#8e3fb0",
-                                                 "#b3261e", "#5a6472", "#0f8ea0"};
+/// Colour and dashes of a chart's n-th line. The colours are those of Okabe and Ito (2008), which also those tell apart
+/// who do not see red against green; their yellow is left out, which is faint on white.
+inline std::string line_style(const LineChart& chart, std::size_t n) {
+  constexpr std::array<const char*, 7> colors = {"#0072b2", "#e69f00", "#009e73", "#cc79a7",
+                                                 "#1c232b", "#56b4e9", "#d55e00"};
+  const LineChart::Line& line = chart.lines[n];
+  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + colors[n % colors.size()] + "\"" +
+         (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
+}
+
+/// In HTML, not in the drawing: it breaks into rows where there is little room.
+inline std::string chart_legend(const LineChart& chart) {
+  std::string out = "<div class=\"legend\">";
+  for (std::size_t n = 0; n < chart.lines.size(); ++n) {
+    out += "<span><svg width=\"26\" height=\"10\" aria-hidden=\"true\"><line" + line_style(chart, n) +
+           " x1=\"1\" x2=\"25\" y1=\"5\" y2=\"5\"/></svg>" + html_text(chart.lines[n].name) + "</span>";
+  }
+  return out + "</div>\n";
+}
+
+/// A drawing's size and how close its labels stand. A chart is drawn twice, since the letters of a wide one shrink too
+/// much on a telephone.
+struct ChartShape {
+  const char* kind;
+  double width, height, left, right, top, bottom;
+  int x_ticks, y_ticks;
+};
+inline constexpr ChartShape wide_chart{"wide", 880, 310, 70, 16, 14, 48, 10, 6};
+inline constexpr ChartShape narrow_chart{"narrow", 360, 270, 54, 8, 12, 46, 5, 5};
+
+inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = wide_chart) {
+  const double width = shape.width, height = shape.height, left = shape.left, right = shape.right, top = shape.top,
+               bottom = shape.bottom;
   double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low, y_low = x_low, y_high = -x_low;
   for (const LineChart::Line& line : chart.lines) {
     for (std::size_t k = 0; k < line.x.size(); ++k) {
@@ -164,7 +211,15 @@ inline std::string chart_svg(const LineChart& chart) {
       }
     }
   }
-  const Ticks x_ticks(x_low, x_high, 10), y_ticks(y_low, y_high, 6);
+  for (const double x : chart.x_within) {
+    x_low = std::isfinite(x) ? std::min(x_low, x) : x_low;
+    x_high = std::isfinite(x) ? std::max(x_high, x) : x_high;
+  }
+  for (const double y : chart.y_within) {
+    y_low = std::isfinite(y) ? std::min(y_low, y) : y_low;
+    y_high = std::isfinite(y) ? std::max(y_high, y) : y_high;
+  }
+  const Ticks x_ticks(x_low, x_high, shape.x_ticks), y_ticks(y_low, y_high, shape.y_ticks);
   if (!(x_high > x_low)) {
     x_low = x_ticks.first;
     x_high = x_ticks.last;
@@ -175,7 +230,8 @@ inline std::string chart_svg(const LineChart& chart) {
   };
   const auto point = [](double value) { return fixed_text(value, 1); };
 
-  std::string svg = "<svg class=\"chart\" viewBox=\"0 0 880 330\" role=\"img\" aria-label=\"" + html_text(chart.title) +
+  std::string svg = std::string("<svg class=\"chart ") + shape.kind + "\" viewBox=\"0 0 " + fixed_text(width, 0) + " " +
+                    fixed_text(height, 0) + "\" role=\"img\" aria-label=\"" + html_text(chart.title) +
                     "\" data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
                     "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\">\n";
   for (const double y : y_ticks.values()) {
@@ -194,11 +250,8 @@ inline std::string chart_svg(const LineChart& chart) {
   svg += "<text text-anchor=\"middle\" x=\"" + point((left + width - right) / 2) + "\" y=\"" + point(height - 8) +
          "\">" + html_text(chart.x_label) + "</text>\n<text text-anchor=\"middle\" transform=\"translate(16," +
          point((top + height - bottom) / 2) + ") rotate(-90)\">" + html_text(chart.y_label) + "</text>\n";
-  double legend = left;
   for (std::size_t n = 0; n < chart.lines.size(); ++n) {
     const LineChart::Line line = thinned(chart.lines[n], 1000);
-    const std::string style =
-        std::string(" stroke=\"") + colors[n % colors.size()] + "\"" + (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
     std::string path;
     bool drawing = false;
     for (std::size_t k = 0; k < line.x.size(); ++k) {
@@ -209,11 +262,7 @@ inline std::string chart_svg(const LineChart& chart) {
       path += (drawing ? "L" : "M") + point(x_at(line.x[k])) + " " + point(y_at(line.y[k]));
       drawing = true;
     }
-    svg += "<path class=\"line\"" + style + " d=\"" + path + "\"/>\n";
-    svg += "<line class=\"line\"" + style + " x1=\"" + point(legend) + "\" x2=\"" + point(legend + 24) +
-           "\" y1=\"16\" y2=\"16\"/><text x=\"" + point(legend + 30) + "\" y=\"20\">" + html_text(line.name) +
-           "</text>\n";
-    legend += 54 + 7.2 * static_cast<double>(line.name.size());
+    svg += "<path" + line_style(chart, n) + " d=\"" + path + "\"/>\n";
   }
   svg += "<line class=\"now\" x1=\"-9\" x2=\"-9\" y1=\"" + point(top) + "\" y2=\"" + point(height - bottom) +
          "\"/>\n</svg>\n";
@@ -226,8 +275,33 @@ inline std::string chart_svg(const LineChart& chart) {
 class HtmlReport {
  public:
   struct Frame {
-    double time = 0;  ///< [s]
-    std::string png;  ///< a file's bytes, see png_bytes
+    double time = 0;     ///< [s]
+    std::string png;     ///< a file's bytes, see png_bytes
+    std::string note{};  ///< shown beside the time
+  };
+
+  struct Film {
+    std::string name;
+    std::vector<Frame> frames;
+  };
+
+  /// A picture in a grid.
+  struct Cell {
+    std::string png;  ///< a file's bytes; empty: only the caption is there
+    std::string caption;
+    std::string link{};  ///< where a click leads to, such as film_link()
+  };
+
+  struct GridRow {
+    std::string name;
+    std::vector<Cell> cells;
+  };
+
+  /// How a table is set, beside its cells.
+  struct TableLook {
+    /// Headings above the header, each with the number of columns that it spans; those of no text are left open.
+    std::vector<std::pair<std::string, std::size_t>> groups{};
+    std::vector<std::pair<std::size_t, std::size_t>> bold{};  ///< row and column; the header is row 0
   };
 
   explicit HtmlReport(std::string title) : title_(std::move(title)) {}
@@ -235,25 +309,38 @@ class HtmlReport {
   void heading(const std::string& text) { body_ += "<h2>" + detail::html_text(text) + "</h2>\n"; }
   void paragraph(const std::string& text) { body_ += "<p>" + detail::html_text(text) + "</p>\n"; }
 
-  void table(const Table& table) {
-    body_ += "<table>\n";
-    for (std::size_t r = 0; r < table.rows().size(); ++r) {
-      const char* cell = r == 0 ? "th" : "td";
-      body_ += "<tr>";
-      for (const std::string& text : table.rows()[r]) {
-        body_ += std::string("<") + cell + ">" + detail::html_text(text) + "</" + cell + ">";
+  void table(const Table& table) { this->table(table, {}); }
+
+  void table(const Table& table, const TableLook& look) {
+    body_ += "<div class=\"scroll\"><table>\n";
+    if (!look.groups.empty()) {
+      body_ += "<tr class=\"groups\">";
+      for (const auto& [text, columns] : look.groups) {
+        body_ += (text.empty() ? "<td colspan=\"" : "<th colspan=\"") + std::to_string(columns) + "\">" +
+                 (text.empty() ? "</td>" : "<span>" + detail::html_text(text) + "</span></th>");
       }
       body_ += "</tr>\n";
     }
-    body_ += "</table>\n";
+    for (std::size_t r = 0; r < table.rows().size(); ++r) {
+      const char* cell = r == 0 ? "th" : "td";
+      body_ += "<tr>";
+      for (std::size_t column = 0; column < table.rows()[r].size(); ++column) {
+        const bool bold = std::find(look.bold.begin(), look.bold.end(), std::pair(r, column)) != look.bold.end();
+        body_ += std::string("<") + cell + (bold ? " class=\"bold\">" : ">") +
+                 detail::html_text(table.rows()[r][column]) + "</" + cell + ">";
+      }
+      body_ += "</tr>\n";
+    }
+    body_ += "</table></div>\n";
   }
 
   void chart(const LineChart& chart) {
     for (const LineChart::Line& line : chart.lines) {
       expects(line.x.size() == line.y.size(), "LineChart: numbers of x and y of a line", "equal, y has", line.y.size());
     }
-    body_ += "<figure><figcaption>" + detail::html_text(chart.title) + "</figcaption>\n" + detail::chart_svg(chart) +
-             "</figure>\n";
+    body_ += "<figure><figcaption class=\"title\">" + detail::html_text(chart.title) + "</figcaption>\n" +
+             detail::chart_legend(chart) + detail::chart_svg(chart, detail::wide_chart) +
+             detail::chart_svg(chart, detail::narrow_chart) + "</figure>\n";
   }
 
   void picture(const Picture& picture, const std::string& caption) {
@@ -262,26 +349,84 @@ class HtmlReport {
              "</figcaption></figure>\n";
   }
 
+  /// What the colours of pictures stand for.
+  void legend(const std::vector<std::pair<std::string, std::array<std::uint8_t, 3>>>& entries) {
+    body_ += "<div class=\"legend\">";
+    for (const auto& [name, colour] : entries) {
+      body_ += "<span><i style=\"background:rgb(" + std::to_string(colour[0]) + "," + std::to_string(colour[1]) + "," +
+               std::to_string(colour[2]) + ")\"></i>" + detail::html_text(name) + "</span>";
+    }
+    body_ += "</div>\n";
+  }
+
+  /// Pictures in rows and columns, to compare. @param columns their headings.
+  void grid(const std::vector<std::string>& columns, const std::vector<GridRow>& rows, const std::string& caption) {
+    body_ += "<figure><div class=\"scroll\"><table class=\"grid-of-pictures\">\n<tr>";
+    for (const std::string& column : columns) {
+      body_ += "<th>" + detail::html_text(column) + "</th>";
+    }
+    body_ += "</tr>\n";
+    for (const GridRow& row : rows) {
+      body_ += "<tr><th class=\"name\" colspan=\"" + std::to_string(std::max<std::size_t>(1, columns.size())) +
+               "\"><span>" + detail::html_text(row.name) + "</span></th></tr>\n<tr>";
+      for (const Cell& cell : row.cells) {
+        const std::string caption_text = detail::html_text(cell.caption);
+        const std::string image = cell.png.empty()
+                                      ? std::string()
+                                      : "<img alt=\"" + detail::html_text(row.name) + ", " + caption_text +
+                                            "\" src=\"data:image/png;base64," + detail::base64(cell.png) + "\">";
+        body_ += "<td>" +
+                 (cell.link.empty() ? image : "<a href=\"" + detail::html_text(cell.link) + "\">" + image + "</a>") +
+                 caption_text + "</td>";
+      }
+      body_ += "</tr>\n";
+    }
+    body_ += "</table></div><figcaption>" + detail::html_text(caption) + "</figcaption></figure>\n";
+  }
+
   /// Pictures in order of time with a slider below them; a mark in every chart, whose x axis should be the same time,
-  /// follows the slider. One film per report.
-  void film(const std::vector<Frame>& frames, const std::string& caption) {
-    if (frames.empty()) {
+  /// follows the slider. One film, or set of films, per report.
+  void film(const std::vector<Frame>& frames, const std::string& caption) { films({{"", frames}}, caption); }
+
+  /// Films of the same times, of which one is shown: a list lets the reader choose by name. In charts, lines that have
+  /// the chosen film's name are drawn stronger. @param start the picture that is shown first, counted from 0. Throws
+  /// std::invalid_argument where films differ in length.
+  void films(const std::vector<Film>& all, const std::string& caption, std::size_t start = 0) {
+    if (all.empty() || all.front().frames.empty()) {
       return;
     }
-    std::string images, times;
-    for (const Frame& frame : frames) {
-      images += (images.empty() ? "\"" : ",\n\"") + detail::base64(frame.png) + "\"";
+    const std::size_t count = all.front().frames.size();
+    std::string list, options, times;
+    for (const Film& film : all) {
+      expects(film.frames.size() == count, "HtmlReport: frames of each film", "as many as of the first",
+              film.frames.size());
+      std::string images, notes;
+      for (const Frame& frame : film.frames) {
+        images += (images.empty() ? "\"" : ",\n\"") + detail::base64(frame.png) + "\"";
+        notes += (notes.empty() ? "\"" : ",\"") + detail::script_text(frame.note) + "\"";
+      }
+      list += std::string(list.empty() ? "" : ",\n") + "{name: \"" + detail::script_text(film.name) + "\", notes: [" +
+              notes + "],\nimages: [" + images + "]}";
+      options += "<option>" + detail::html_text(film.name) + "</option>";
+    }
+    for (const Frame& frame : all.front().frames) {
       times += (times.empty() ? "" : ",") + detail::fixed_text(frame.time, 3);
     }
-    body_ +=
-        "<figure><img id=\"film\" alt=\"" + detail::html_text(caption) +
-        "\"><div class=\"bar\"><button id=\"play\" type=\"button\">Play</button><input id=\"scrub\" type=\"range\" "
-        "min=\"0\" max=\"" +
-        std::to_string(frames.size() - 1) +
-        "\" value=\"0\" aria-label=\"frame\"><output id=\"time\"></output></div><figcaption>" +
-        detail::html_text(caption) + "</figcaption></figure>\n";
-    script_ = "<script>\nconst images = [" + images + "];\nconst times = [" + times + "];\n" + film_script();
-    script_ += "</script>\n";
+    body_ += "<figure id=\"film-figure\"><div class=\"bar\"" + std::string(all.size() > 1 ? "" : " hidden") +
+             "><label for=\"choice\">Show</label><select id=\"choice\">" + options +
+             "</select></div><div class=\"screen\"><img id=\"film\" alt=\"" + detail::html_text(caption) +
+             "\"></div><div class=\"bar\"><button id=\"play\" type=\"button\">Play</button><input id=\"scrub\" "
+             "type=\"range\" min=\"0\" max=\"" +
+             std::to_string(count - 1) + "\" value=\"" + std::to_string(start) +
+             "\" aria-label=\"frame\"></div><output id=\"time\" for=\"scrub\"></output><figcaption>" +
+             detail::html_text(caption) + "</figcaption></figure>\n";
+    script_ = "<script>\n'use strict';\n{\nconst films = [" + list + "];\nconst times = [" + times + "];\n" +
+              film_script() + "}\n</script>\n";
+  }
+
+  /// The address, inside of the page, of a picture of a film, both counted from 0.
+  static std::string film_link(std::size_t film, std::size_t picture) {
+    return "#film=" + std::to_string(film) + "&picture=" + std::to_string(picture);
   }
 
   std::string text() const {
@@ -296,43 +441,129 @@ class HtmlReport {
 
  private:
   static const char* style() {
-    return "body{font:16px/1.5 system-ui,sans-serif;color:#1c232b;background:#fff;max-width:920px;margin:2em auto;"
-           "padding:0 1em}\n"
-           "h1{font-size:1.6em;margin-bottom:.3em}h2{font-size:1.2em;margin-top:1.8em}\n"
-           "table{border-collapse:collapse;font-variant-numeric:tabular-nums}"
-           "th,td{padding:.3em 1.1em .3em 0;text-align:right;border-bottom:1px solid #dfe4ea}"
-           "th:first-child,td:first-child{text-align:left}\n"
-           "figure{margin:1.2em 0}figcaption{color:#4a5563;font-size:.92em}img{max-width:100%}\n"
-           ".chart{width:100%;height:auto;font:12px system-ui,sans-serif;fill:#4a5563}"
-           ".grid{stroke:#e6eaef}.zero{stroke:#9aa5b1}.line{fill:none;stroke-width:1.8;stroke-linejoin:round}"
-           ".now{stroke:#1c232b;stroke-dasharray:2 3}\n"
-           ".bar{display:flex;gap:1em;align-items:center;max-width:640px}.bar input{flex:1}"
-           "#time{min-width:5em;text-align:right;font-variant-numeric:tabular-nums}\n";
+    return R"(body{font:16px/1.5 system-ui,sans-serif;color:#1c232b;background:#fff;max-width:920px;margin:2em auto;padding:0 1em}
+h1{font-size:1.6em;line-height:1.25;margin-bottom:.3em}h2{font-size:1.2em;margin:2em 0 .5em}p{max-width:44em}
+.scroll{overflow-x:auto}
+table{border-collapse:collapse;font-size:.94em;font-variant-numeric:tabular-nums}
+th,td{padding:.35em 0 .35em 1.1em;text-align:right;vertical-align:bottom;border-bottom:1px solid #dfe4ea}
+th{font-weight:500;color:#4a5563;border-bottom-color:#9aa5b1}td,.groups th{white-space:nowrap}.bold{font-weight:700}
+th:first-child,td:first-child{text-align:left;padding-left:0;position:sticky;left:0;background:#fff}
+.groups th,.groups td{border:0;padding-bottom:0}.groups th{text-align:left}
+.groups span{display:block;border-bottom:1px solid #dfe4ea}
+figure{margin:1.4em 0}figcaption{color:#4a5563;font-size:.92em}figcaption.title{color:#1c232b;font-size:1em;font-weight:500}
+img{max-width:100%}
+.legend{display:flex;flex-wrap:wrap;gap:.1em 1.4em;color:#4a5563;font-size:.88em;margin:.3em 0}
+.legend span{display:inline-flex;align-items:center;gap:.45em}
+.legend i{width:1em;height:1em;border-radius:2px;box-shadow:inset 0 0 0 1px #0003}
+.chart{width:100%;height:auto;font:12px system-ui,sans-serif;fill:#4a5563;font-variant-numeric:tabular-nums}
+.grid{stroke:#e6eaef}.zero{stroke:#9aa5b1}.line{fill:none;stroke-width:1.6;stroke-linejoin:round}
+.strong{stroke-width:3}.now{stroke:#1c232b;stroke-dasharray:2 3}
+.narrow{display:none}
+.screen{border:1px solid #dfe4ea;border-radius:4px;text-align:center;line-height:0}
+.screen img{max-height:65vh;object-fit:contain}
+.bar{display:flex;gap:.8em;align-items:center;margin:.6em 0}.bar[hidden]{display:none}
+.bar input{flex:1;min-width:6em;accent-color:#0072b2}
+button,select{font:inherit;color:inherit;background:#fff;border:1px solid #9aa5b1;border-radius:4px;padding:.25em .8em}
+button{min-width:5.2em}
+#time{display:block;font-variant-numeric:tabular-nums;margin-bottom:.4em}
+.grid-of-pictures{width:100%;min-width:40em;table-layout:fixed;font-size:.84em}
+.grid-of-pictures th,.grid-of-pictures td{padding:.2em .25em;text-align:center;border:0;position:static;color:#4a5563}
+.grid-of-pictures .name{text-align:left;color:#1c232b;padding-top:.8em}.name span{position:sticky;left:0}
+.grid-of-pictures img{display:block;width:100%;border-radius:3px;box-shadow:0 0 0 1px #dfe4ea;margin-bottom:.2em}
+.grid-of-pictures a:hover img{box-shadow:0 0 0 2px #0072b2}
+@media (max-width:600px){.wide{display:none}.narrow{display:block}body{margin:1em auto}}
+@media print{.bar{display:none}}
+)";
   }
 
   static const char* film_script() {
-    return "const film = document.getElementById('film'), scrub = document.getElementById('scrub');\n"
-           "const play = document.getElementById('play'), label = document.getElementById('time');\n"
-           "function show() {\n"
-           "  const k = Number(scrub.value);\n"
-           "  film.src = 'data:image/png;base64,' + images[k];\n"
-           "  label.textContent = times[k].toFixed(2) + ' s';\n"
-           "  for (const chart of document.querySelectorAll('.chart')) {\n"
-           "    const d = chart.dataset, span = d.high - d.low;\n"
-           "    const x = Number(d.left) + (times[k] - d.low) / span * (d.right - d.left);\n"
-           "    const inside = times[k] >= Number(d.low) && times[k] <= Number(d.high);\n"
-           "    for (const end of ['x1', 'x2']) chart.querySelector('.now').setAttribute(end, inside ? x : -9);\n"
-           "  }\n"
-           "}\n"
-           "scrub.addEventListener('input', show);\n"
-           "let timer = null;\n"
-           "play.addEventListener('click', () => {\n"
-           "  if (timer) { clearInterval(timer); timer = null; play.textContent = 'Play'; return; }\n"
-           "  play.textContent = 'Pause';\n"
-           "  timer = setInterval(() => { scrub.value = (Number(scrub.value) + 1) % images.length; show(); },\n"
-           "                      1000 * Math.max(0.02, (times[times.length - 1] - times[0]) / images.length));\n"
-           "});\n"
-           "show();\n";
+    return R"(const part = name => document.getElementById(name);
+const film = part('film'), scrub = part('scrub'), play = part('play'), label = part('time'), choice = part('choice');
+const charts = document.querySelectorAll('.chart');
+let timer = null;
+// whole steps of screen pixels keep edges crisp
+function fit() {
+  if (!film.naturalWidth) return;
+  const room = Math.min(film.parentNode.clientWidth / film.naturalWidth, 0.65 * innerHeight / film.naturalHeight);
+  const zoom = Math.floor(room * devicePixelRatio) / devicePixelRatio;
+  film.style.width = zoom >= 1 ? zoom * film.naturalWidth + 'px' : '';
+  film.style.imageRendering = zoom >= 1 ? 'pixelated' : '';
+}
+function show() {
+  const k = Number(scrub.value), chosen = films[choice.selectedIndex];
+  film.src = 'data:image/png;base64,' + chosen.images[k];
+  label.textContent = times[k].toFixed(2) + ' s' + (chosen.notes[k] ? ' \u00b7 ' + chosen.notes[k] : '');
+  scrub.setAttribute('aria-valuetext', label.textContent);
+  for (const chart of charts) {
+    const d = chart.dataset, low = Number(d.low), high = Number(d.high);
+    const x = Number(d.left) + (times[k] - low) / (high - low) * (d.right - d.left);
+    const inside = times[k] >= low && times[k] <= high;
+    for (const end of ['x1', 'x2']) chart.querySelector('.now').setAttribute(end, inside ? x : -9);
+  }
+}
+function choose() {
+  for (const line of document.querySelectorAll('.line')) {
+    line.classList.toggle('strong', films.length > 1 && line.dataset.name === films[choice.selectedIndex].name);
+  }
+  show();
+}
+function go_to(k) {
+  scrub.value = Math.min(Math.max(k, 0), times.length - 1);
+  show();
+}
+function stop() {
+  clearInterval(timer);
+  timer = null;
+  play.textContent = 'Play';
+}
+function toggle() {
+  if (timer) return stop();
+  play.textContent = 'Pause';
+  timer = setInterval(() => go_to((Number(scrub.value) + 1) % times.length),
+                      1000 * Math.max(0.02, (times[times.length - 1] - times[0]) / times.length));
+}
+// addresses such as #film=1&picture=12
+function follow_address() {
+  const wish = new URLSearchParams(location.hash.slice(1));
+  if (!wish.has('film') && !wish.has('picture')) return;
+  stop();
+  choice.selectedIndex = Math.min(Math.max(Number(wish.get('film')) || 0, 0), films.length - 1);
+  go_to(Number(wish.get('picture')) || 0);
+  choose();
+  part('film-figure').scrollIntoView({block: 'nearest'});
+}
+function seek(chart, event) {
+  const d = chart.dataset, box = chart.getBoundingClientRect();
+  const x = (event.clientX - box.left) / box.width * chart.viewBox.baseVal.width;
+  const time = Number(d.low) + (x - d.left) / (d.right - d.left) * (d.high - d.low);
+  let nearest = 0;
+  times.forEach((t, k) => { if (Math.abs(t - time) < Math.abs(times[nearest] - time)) nearest = k; });
+  stop();
+  go_to(nearest);
+}
+film.addEventListener('load', fit);
+window.addEventListener('resize', fit);
+scrub.addEventListener('input', show);
+choice.addEventListener('change', choose);
+play.addEventListener('click', toggle);
+window.addEventListener('hashchange', follow_address);
+// a link that is followed twice changes nothing in the address
+document.addEventListener('click', event => { if (event.target.closest('a')) setTimeout(follow_address); });
+for (const chart of charts) {
+  chart.addEventListener('pointerdown', event => seek(chart, event));
+  chart.addEventListener('pointermove', event => { if (event.buttons & 1) seek(chart, event); });
+}
+document.addEventListener('keydown', event => {
+  const step = {ArrowLeft: -1, ArrowRight: 1}[event.key];
+  // the slider has keys of its own
+  if (!step || event.target === scrub || event.ctrlKey || event.altKey || event.metaKey) return;
+  event.preventDefault();
+  stop();
+  go_to(Number(scrub.value) + step);
+});
+choose();
+follow_address();
+)";
   }
 
   std::string title_;
