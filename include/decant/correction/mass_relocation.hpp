@@ -87,16 +87,8 @@ class MassRelocation {
   Index relocate(FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
                  Mask& unexplained_before) noexcept {
     const Index observed_px = (*view.observed >= 128).count(), predicted_px = (*view.predicted >= 128).count();
-<<<<<<< HEAD
     to_observed_.rebuild(*view.observed, MaskPart::Liquid, seen.threads);
     to_predicted_.rebuild(*view.predicted, MaskPart::Liquid, seen.threads);
-=======
-    if (observed_px < settings_.least_pixels) {
-      return 0;
-    }
-    to_observed_.rebuild(*view.observed, MaskPart::Liquid, seen.threads);
-    to_predicted_.rebuild(*view.predicted, MaskPart::Liquid, seen.threads);
->>>>>>> tidy
     find_wanted(view, unexplained_before);
     sort_particles(fluid, seen, view);
 
