@@ -88,23 +88,23 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   for (int k = 0; k < 2; ++k) {
     switch (kinds[static_cast<std::size_t>(k)]) {
       case 0: {
-        const double size = between(1.0, 1.5);
+        const double size = between(0.7, 1.1);
         const double angle = between(0, 2 * std::numbers::pi);
         hidden.pull = {size * std::cos(angle), size * std::sin(angle), 0};
         break;
       }
       case 1:
-        hidden.drag = between(1.5, 3);
+        hidden.drag = between(1, 2);
         break;
       case 2:  // what a boundary layer does that is thinner than a particle
         hidden.sticky_walls = true;
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 2e-4);
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 1e-4);
         break;
       case 3:
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-3.7, -3.0)));
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.0, -3.4)));
         break;
       case 4:
-        hidden.latency = between(0.09, 0.14);
+        hidden.latency = between(0.06, 0.1);
         break;
       default:
         break;
@@ -281,6 +281,8 @@ inline decant::Pose off_by(const decant::Pose& pose, double millimetres, double 
 
 namespace detail {
 
+inline constexpr double calming = 0.1;  ///< before the recording begins [s]
+
 /// Runs the reality and writes the recording. For any composition with the bodies in this order: container, pan.
 template <class Parts>
 void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::filesystem::path& folder,
@@ -304,14 +306,25 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
     StateEquation<float>& solver = reality.pressure_solver();
     solver.set_sound_speed(14, static_cast<float>(settings.liquid.density));  // six times as fast as the jet
     solver.courant_number = 0.6F;
-    solver.artificial_viscosity = 0.03F;
+    solver.artificial_viscosity = 1;  // until it has calmed down
   }
   using Filling = std::conditional_t<foreign, SettledParts, Parts>;
   Simulator<Filling> filling(settings);
   filling.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)));
   const FillReport filled = decant::fill(filling, cup, FillAmount::fraction(twin.fill_fraction));
   reality.add_particles(filling.fluid().position, filling.fluid().velocity, cup);
-  reality.set_motion(cup, motion);
+  if (foreign) {  // what one solver takes for settled is not quite at rest for another
+    reality.step(calming);
+  }
+  if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
+    reality.pressure_solver().artificial_viscosity = 0.03F;
+  }
+  const double start = reality.time();
+  std::vector<PoseTrack::Sample> moving = motion.samples();
+  for (PoseTrack::Sample& sample : moving) {
+    sample.time += start;
+  }
+  reality.set_motion(cup, PoseTrack(std::move(moving)));
   reality.watch_contents(cup);
   reality.watch_contents(pan);
 
@@ -357,14 +370,14 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   std::filesystem::create_directories(folder / "truth_mask");
   for (int frame = 0; frame < frames; ++frame) {
     const double time = frame / twin.frames_per_second;
-    StepReport report = reality.step(std::max(0.0, time - reality.time()));
+    StepReport report = reality.step(std::max(0.0, start + time - reality.time()));
     if (!report.advanced()) {
       throw std::runtime_error("the reality stopped at " + std::to_string(time) +
                                " s: " + std::string(to_string(report.status)));
     }
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
-    sight.follow(reality.bodies(), time);
+    sight.follow(reality.bodies(), reality.time());
     unseen.resize(static_cast<std::size_t>(reality.fluid().size()));
     find_hidden(sight, reality.fluid().position, settings.threads, unseen);
     drawing.render(reality.fluid().position, unseen, camera, camera_from_world, clean, settings.threads);

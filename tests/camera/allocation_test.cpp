@@ -1,51 +1,20 @@
 // SPDX-License-Identifier: MIT
-// Nothing that is called every frame allocates. The replaced operators only count, and only while a frame is running;
-// they are not inlined: GCC would see malloc meet delete and warn.
+// Nothing that is called every frame allocates.
 
-#include <atomic>
-#include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <memory>
-#include <new>
 #include <random>
 #include <vector>
 
 #include <decant/camera/depth_buffer.hpp>
 #include <decant/camera/ray_occlusion.hpp>
 
+#include "allocation_count.hpp"
 #include "camera/occluded_scene.hpp"
 #include "catch.hpp"
 
-namespace {
-
-std::atomic<bool> watching{false};
-std::atomic<long> allocations{0};
-
-void* allocate(std::size_t size, std::size_t alignment) {
-  if (watching.load(std::memory_order_relaxed)) {
-    allocations.fetch_add(1, std::memory_order_relaxed);
-  }
-  void* place = std::aligned_alloc(alignment, (size + alignment) / alignment * alignment);
-  if (place == nullptr) {
-    throw std::bad_alloc();
-  }
-  return place;
-}
-
-}  // namespace
-
-[[gnu::noinline]] void* operator new(std::size_t size) { return allocate(size, 16); }
-[[gnu::noinline]] void* operator new[](std::size_t size) { return allocate(size, 16); }
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
-  return allocate(size, static_cast<std::size_t>(alignment));
-}
-[[gnu::noinline]] void operator delete(void* place) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::size_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete[](void* place, std::size_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::align_val_t) noexcept { std::free(place); }
-[[gnu::noinline]] void operator delete(void* place, std::size_t, std::align_val_t) noexcept { std::free(place); }
+using decant_test::allocations;
+using decant_test::watching;
 
 TEST_CASE("Occlusion takes no memory in a frame") {
   using decant::BoundingVolumeHierarchy;

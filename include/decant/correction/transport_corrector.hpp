@@ -25,7 +25,8 @@ struct TransportPass {
 /// Settings of TransportCorrector.
 struct TransportCorrectorSettings {
   /// Coarse to fine: far moves first, edges last.
-  std::vector<TransportPass> passes{{8, 10, 0.4}, {5, 7, 0.6}, {4, 4, 0.8}, {4, 4, 0.8}};
+  std::vector<TransportPass> passes{{8, 10, 0.4}, {5, 7, 0.6}, {4, 4, 0.8},
+                                    {4, 4, 0.8},  {3, 3, 0.8}, {3, 3, 0.8}};
   double dead_zone_px = 0;      ///< shorter moves are noise of the mask's edge, >= 0
   double velocity_gate_px = 2;  ///< shorter moves leave velocities alone, >= 0
   double longest_move = 0.008;  ///< per pass [m], > 0
