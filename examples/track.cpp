@@ -16,76 +16,14 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include <decant/correction/map_filter.hpp>
-#include <decant/correction/map_filter_schenck2017.hpp>
-#include <decant/correction/open_loop.hpp>
-#include <decant/correction/silhouette_corrector.hpp>
-#include <decant/correction/transport_corrector.hpp>
-#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/io/progress.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/table.hpp>
-#include <decant/simulation/parts.hpp>
 
 #include "support/result_file.hpp"
+#include "support/tracking_methods.hpp"
 #include "support/tracking_report.hpp"
 #include "support/tracking_run.hpp"
-
-namespace {
-
-using Model = decant::LiquidSimulator;
-using Progressed = std::function<void(std::size_t)>;
-using Method = std::function<example::TrackingResult(const decant::Recording&, const Model&,
-                                                     const example::TrackingOptions&, const Progressed&)>;
-
-template <class CorrectorType>
-Method method() {
-  return [](const decant::Recording& recording, const Model& model, const example::TrackingOptions& options,
-            const Progressed& progress) {
-    return example::track_recording(recording, model, CorrectorType(), options, {}, progress);
-  };
-}
-
-/// By the names that scripts use. The two of the paper are as printed.
-const std::vector<std::pair<std::string, Method>>& methods() {
-  static const std::vector<std::pair<std::string, Method>> all{
-      {"open_loop", method<decant::OpenLoop<>>()},
-      {"map_filter", method<decant::MapFilterSchenck2017<>>()},
-      {"map_filter_mended", method<decant::MapFilter<>>()},
-      {"warp_field", method<decant::WarpFieldSchenck2017<>>()},
-      {"transport", method<decant::TransportCorrector<>>()},
-      {"default", method<decant::SilhouetteCorrector<>>()},
-  };
-  return all;
-}
-
-nlohmann::json json_of(const example::TrackingResult& result, const decant::Recording& recording,
-                       const std::vector<double>& forecasts) {
-  nlohmann::json json;
-  json["iou_mean"] = example::number_json(result.posterior.mean_over_frames());
-  json["iou_pooled"] = example::number_json(result.posterior.pooled_over_pixels());
-  json["iou"] = example::column_json(result.iou);
-  json["prior_iou"] = example::number_json(result.prior.mean_over_frames());
-  for (std::size_t k = 0; k < forecasts.size(); ++k) {
-    char name[32];
-    std::snprintf(name, sizeof(name), "%g", forecasts[k]);
-    json["forecast_iou"][name] = example::number_json(result.forecasts[k].mean_over_frames());
-  }
-  json["log_likelihood"] = example::number_json(result.log_likelihood);
-  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
-    if (!result.volume_ml[body].empty()) {
-      json["volume_ml"][recording.bodies[body].name] = example::column_json(result.volume_ml[body]);
-    }
-  }
-  const double seconds = 1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
-  json["frames_per_second"] = example::number_json(static_cast<double>(result.frames) / seconds);
-  json["relocated_ml"] = result.relocated_ml;
-  json["particles"] = result.particles;
-  json["status"] = result.status;
-  return json;
-}
-
-}  // namespace
 
 int main(int count, char** values) {
   std::string folder, json_file, report_file;
@@ -96,14 +34,10 @@ int main(int count, char** values) {
   bool without_forecasts = false;
   CLI::App app("Keeps a simulation in step with the masks of a recording, by one or more methods.");
   app.add_option("recording", folder, "folder of a recording, format version 1")->required();
-  std::vector<std::string> known;
-  for (const auto& [name, run] : methods()) {
-    known.push_back(name);
-  }
   app.add_option("--corrector", names,
                  "open_loop, map_filter, warp_field (both as printed), transport, default; several by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember(known));
+      ->check(CLI::IsMember(example::tracking_method_names()));
   app.add_option("--json", json_file, "writes the scores");
   app.add_option("--report", report_file, "writes a page with charts and silhouettes, for a browser");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
@@ -130,29 +64,24 @@ int main(int count, char** values) {
       example::expect_writable(report_file);
     }
     const decant::Recording recording = decant::read_recording(folder);
-    const Model model = example::model_of<decant::DefaultParts<>>(recording, options);
+    const example::TrackingModel model = example::model_of<decant::DefaultParts<>>(recording, options);
     std::printf("%s: %zu frames, %td particles of %.1f mm\n%-12s %6s %6s %6s %6s %8s\n", recording.name.c_str(),
                 recording.frames, model.fluid().size(), spacing_mm, "", "IoU", "pooled", "prior", "+0.5 s", "frames/s");
     for (const std::string& name : names) {
-      for (const auto& [candidate, run] : methods()) {
-        if (candidate != name) {
-          continue;
-        }
-        decant::Progress progress(name, static_cast<double>(recording.frames));
-        example::TrackingResult result =
-            run(recording, model, options, [&](std::size_t done) { progress.update(static_cast<double>(done)); });
-        progress.finish();
-        json["correctors"][name] = json_of(result, recording, options.forecasts);
-        failed = failed || result.status != "ok";
-        const double seconds =
-            1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
-        std::printf("%-12s %6.3f %6.3f %6.3f %6.3f %8.1f  %s\n", name.c_str(), result.posterior.mean_over_frames(),
-                    result.posterior.pooled_over_pixels(), result.prior.mean_over_frames(),
-                    result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
-                    static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
-        std::fflush(stdout);
-        results.push_back({name, std::move(result)});
-      }
+      decant::Progress progress(name, static_cast<double>(recording.frames));
+      example::TrackingResult result = example::tracking_method(name)(
+          recording, model, options, {}, [&](std::size_t done) { progress.update(static_cast<double>(done)); });
+      progress.finish();
+      json["correctors"][name] = example::tracking_json(result, recording, options.forecasts);
+      failed = failed || result.status != "ok";
+      const double seconds =
+          1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
+      std::printf("%-12s %6.3f %6.3f %6.3f %6.3f %8.1f  %s\n", name.c_str(), result.posterior.mean_over_frames(),
+                  result.posterior.pooled_over_pixels(), result.prior.mean_over_frames(),
+                  result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
+                  static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
+      std::fflush(stdout);
+      results.push_back({name, std::move(result)});
     }
     if (!json_file.empty()) {
       decant::detail::write_text_file(json_file, json.dump(1));

@@ -48,6 +48,7 @@ struct PourTwin {
   double spacing = 0.0037;  ///< of the reality's particles [m]
   double duration = 4;      ///< [s]
   double frames_per_second = 30;
+  int threads = 0;  ///< 0: all; the recording does not depend on it
 };
 
 /// Physics of the reality that the model does not have. Two of these are drawn for each recording.
@@ -294,6 +295,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   const PoseTrack motion = pour_motion(twin, container.lip);
   SimulatorSettings settings;
   settings.spacing = twin.spacing;
+  settings.threads = {twin.threads};
   settings.gravity += hidden.pull;
   settings.liquid.dynamic_viscosity = hidden.kinematic_viscosity * settings.liquid.density;
   Simulator<Parts> reality(settings);

@@ -32,7 +32,11 @@ struct TrackingOptions {
   std::vector<double> forecasts{};  ///< how far ahead [s]
   int frames_between_forecasts = 5;
   int threads = 0;
-  bool keep_overlays = false;  ///< for reports; takes some MB of memory per hundred frames
+  bool keep_overlays = false;        ///< for reports; takes some MB of memory per hundred frames
+  double initial_amount_factor = 1;  ///< the model starts with so much of what the recording says, >= 0
+  /// What the tracker gets to see of a frame and camera instead of the recording's masks, which forecasts are scored
+  /// against in any case.
+  std::function<std::optional<decant::Mask>(const decant::Recording&, std::size_t frame, std::size_t camera)> masks{};
 };
 
 /// Observed against predicted silhouette of the first camera in one frame: the part of the image that has any liquid.
@@ -50,7 +54,8 @@ struct TrackingResult {
   std::vector<double> iou, prior_iou;  ///< per frame, NaN where there was no mask
   decant::OverlapScore posterior, prior;
   std::vector<decant::OverlapScore> forecasts;  ///< for each of the options'
-  decant::OverlapScore against_truth;           ///< posterior against masks without noise, where there are any
+  /// Of the first camera, against masks without noise, where there are any: every frame, also those without a mask.
+  decant::OverlapScore against_truth, prior_against_truth;
   double log_likelihood = 0;
   std::vector<std::vector<double>> volume_ml;  ///< per body and frame
   double relocated_ml = 0;
@@ -113,8 +118,9 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
   if (recording.liquid.initial) {
     const auto& initial = *recording.liquid.initial;
     expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
-    const FillAmount amount =
+    FillAmount amount =
         initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction) : FillAmount::volume(*initial.volume);
+    amount.value *= options.initial_amount_factor;
     if (amount.value > 0) {
       decant::fill(model, static_cast<BodyId>(initial.body), amount);
     }
@@ -137,6 +143,44 @@ decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Mode
   return decant::PoseTrack(std::move(samples));
 }
 
+/// A corrector that also keeps the first camera's silhouette of before the correction, which the tracker draws over.
+template <class CorrectorType>
+class PriorKeeper {
+ public:
+  using Scalar = typename CorrectorType::Scalar;
+  using Observation = typename CorrectorType::Observation;
+
+  explicit PriorKeeper(CorrectorType corrector) : corrector_(std::move(corrector)) {}
+
+  int passes() const noexcept {
+    if constexpr (requires { corrector_.passes(); }) {
+      return corrector_.passes();
+    } else {
+      return 1;
+    }
+  }
+
+  decant::CorrectionReport correct(decant::FluidState<Scalar>& fluid, const Observation& seen, Scalar dt) noexcept {
+    for (const auto& view : seen.views) {
+      if (seen.pass == 0 && view.number == 0) {
+        prior_ = *view.predicted;
+        kept_ = true;
+      }
+    }
+    return corrector_.correct(fluid, seen, dt);
+  }
+
+  void reset() noexcept { corrector_.reset(); }
+
+  /// Since the last call; nothing where no correction was made.
+  const decant::Mask* take_prior() noexcept { return std::exchange(kept_, false) ? &prior_ : nullptr; }
+
+ private:
+  CorrectorType corrector_;
+  decant::Mask prior_{};
+  bool kept_ = false;
+};
+
 /// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for
 /// scoring.
 template <class Model, class CorrectorType>
@@ -148,7 +192,8 @@ TrackingResult track_recording(
   TrackerSettings settings;
   settings.gravity = recording.gravity;
   settings.threads = {options.threads};
-  Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
+  using Watched = PriorKeeper<CorrectorType>;
+  Tracker<Model, Watched> tracker(model, Watched(std::move(corrector)), settings);
   for (const recording::Camera& camera : recording.cameras) {
     const recording::View& view = camera.view(0);
     tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
@@ -168,7 +213,8 @@ TrackingResult track_recording(
     kept.reserve(recording.cameras.size());
     for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
       tracker.set_camera_pose(camera, recording.cameras[camera].view(frame).camera_from_world);
-      if (std::optional<Mask> mask = recording.mask(frame, camera)) {
+      if (std::optional<Mask> mask =
+              options.masks ? options.masks(recording, frame, camera) : recording.mask(frame, camera)) {
         kept.push_back(std::move(*mask));
         masks.push_back({camera, kept.back()});
       }
@@ -201,7 +247,10 @@ TrackingResult track_recording(
     result.relaxation_ms += report.relaxation_ms;
     if (!truth_masks.empty()) {
       const auto file = truth_masks / (decant::detail::six_digits(frame) + ".png");
-      result.against_truth.add(overlap(tracker.predicted(0), read_png_grey8(file)));
+      const Mask truth = read_png_grey8(file);
+      const Mask* prior = tracker.corrector().take_prior();
+      result.prior_against_truth.add(overlap(prior != nullptr ? *prior : tracker.predicted(0), truth));
+      result.against_truth.add(overlap(tracker.predicted(0), truth));
     }
     for (std::size_t k = 0; k < options.forecasts.size(); ++k) {
       const double ahead = options.forecasts[k];

@@ -1,0 +1,592 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The tracking experiment of Schenck and Fox (2017) on twins of their pours: the recordings, what goes wrong between a
+/// recording and the tracker, and runs of methods on them that are kept in files, so that nothing is computed twice.
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/core/image.hpp>
+#include <decant/coverage/mask_cleaning.hpp>
+#include <decant/io/detail/folder.hpp>
+#include <decant/io/detail/text.hpp>
+#include <decant/io/png.hpp>
+#include <decant/io/progress.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/io/recording_truth.hpp>
+#include <decant/tracking/overlap.hpp>
+#include <decant/tracking/overlap_score.hpp>
+#include <decant/tracking/tracker.hpp>
+
+#include "pour_twin.hpp"
+#include "result_file.hpp"
+#include "tracking_methods.hpp"
+#include "tracking_run.hpp"
+
+namespace example {
+
+/// A recording of the experiment: its folder's name and how it is made.
+struct Pour {
+  std::string name;
+  PourTwin twin;
+};
+
+inline Pour pour(const std::string& prefix, const std::string& container, int percent, std::uint32_t seed) {
+  PourTwin twin;
+  twin.container = container;
+  twin.fill_fraction = 0.01 * percent;
+  twin.seed = seed;
+  return {prefix + container + "_" + std::to_string(percent) + "_" + std::to_string(seed), twin};
+}
+
+/// The paper's: cup and bottle, three amounts, two trials each.
+inline std::vector<Pour> paper_pours() {
+  std::vector<Pour> pours;
+  std::uint32_t seed = 0;
+  for (const char* container : {"cup", "bottle"}) {
+    for (const int percent : {30, 60, 90}) {
+      for (int trial = 0; trial < 2; ++trial) {
+        pours.push_back(pour("", container, percent, ++seed));
+      }
+    }
+  }
+  return pours;
+}
+
+/// Reality is the model's own solver at another spacing, and bodies are where they are said to be: all that is wrong
+/// is the masks' noise, from which a corrector can only do harm.
+inline std::vector<Pour> harmless_pours() {
+  std::vector<Pour> pours;
+  std::uint32_t seed = 20;
+  for (const char* container : {"cup", "bottle"}) {
+    for (const int percent : {30, 60, 90}) {
+      pours.push_back(pour("plain_", container, percent, ++seed));
+      pours.back().twin.hidden_physics = pours.back().twin.noisy_poses = false;
+    }
+  }
+  return pours;
+}
+
+inline std::vector<Pour> pours_named(const std::vector<std::string>& names) {
+  std::vector<Pour> chosen;
+  for (const Pour& each : paper_pours()) {
+    if (std::find(names.begin(), names.end(), each.name) != names.end()) {
+      chosen.push_back(each);
+    }
+  }
+  return chosen;
+}
+
+/// Something that goes wrong between a recording and the tracker, more or less.
+struct Condition {
+  using Apply = void (*)(double value, std::uint32_t seed, decant::Recording& recording, TrackingOptions& options);
+
+  std::string name;  ///< for scripts and files
+  std::string title;
+  std::string label;           ///< of the value, with its unit
+  std::vector<double> values;  ///< the first changes nothing
+  bool in_masks;               ///< nothing but masks is altered: open loop does not notice
+  Apply apply;
+};
+
+namespace detail {
+
+/// Of a recording, a frame and a purpose, so that neither order nor number of frames plays a role.
+inline std::mt19937 random_of(std::uint32_t seed, std::uint32_t purpose, std::size_t frame) {
+  std::seed_seq sequence{seed, purpose, static_cast<std::uint32_t>(frame)};
+  return std::mt19937(sequence);
+}
+
+/// Turns a share of the pixels that are (or are not) liquid over, each by itself.
+inline decant::Mask with_wrong_pixels(decant::Mask mask, bool among_liquid, double share, std::mt19937& random) {
+  const auto limit = static_cast<std::uint64_t>(share * 4294967296.0);  // of a generator's 32 bits
+  for (decant::Index row = 0; row < mask.rows(); ++row) {
+    for (decant::Index column = 0; column < mask.cols(); ++column) {
+      if (const bool liquid = decant::is_liquid(mask(row, column)); liquid == among_liquid && random() < limit) {
+        mask(row, column) = liquid ? std::uint8_t(0) : decant::mask_liquid;
+      }
+    }
+  }
+  return mask;
+}
+
+/// Grows liquid by a disc, or shrinks it if the radius is negative. What lies beyond the border has no say.
+inline decant::Mask grown(const decant::Mask& mask, int radius_px) {
+  const bool spreading = radius_px > 0;  // what spreads: liquid, or its absence
+  const decant::Index reach = std::abs(radius_px);
+  decant::Mask out = mask;
+  for (decant::Index row = 0; row < mask.rows(); ++row) {
+    for (decant::Index column = 0; column < mask.cols(); ++column) {
+      if (decant::is_liquid(mask(row, column)) != spreading) {
+        continue;
+      }
+      for (decant::Index v = std::max<decant::Index>(0, row - reach); v <= std::min(mask.rows() - 1, row + reach);
+           ++v) {
+        for (decant::Index u = std::max<decant::Index>(0, column - reach);
+             u <= std::min(mask.cols() - 1, column + reach); ++u) {
+          if ((v - row) * (v - row) + (u - column) * (u - column) <= reach * reach) {
+            out(v, u) = spreading ? decant::mask_liquid : std::uint8_t(0);
+          }
+        }
+      }
+    }
+  }
+  return out;
+}
+
+inline decant::Mask cleaned(const decant::Mask& mask) {
+  const decant::TrackerSettings settings;
+  decant::Mask out(mask.rows(), mask.cols());
+  decant::MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(mask, out, {1});
+  return out;
+}
+
+/// Puts the source container elsewhere, always in the same direction.
+inline void misplace(double millimetres, double degrees, std::uint32_t seed, decant::Recording& recording) {
+  for (decant::recording::Body& body : recording.bodies) {
+    if (body.role != decant::recording::Role::Source) {
+      continue;
+    }
+    std::vector<decant::PoseTrack::Sample> samples;
+    for (const auto& sample : body.motion.samples()) {
+      std::mt19937 random = random_of(seed, 1, 0);
+      samples.push_back({sample.time, off_by(sample.pose, millimetres, degrees, random)});
+    }
+    body.motion = decant::PoseTrack(std::move(samples));
+  }
+}
+
+inline void flip_pixels(bool among_liquid, double percent, std::uint32_t seed, TrackingOptions& options) {
+  options.masks = [=](const decant::Recording& recording, std::size_t frame, std::size_t camera) {
+    std::optional<decant::Mask> mask = recording.mask(frame, camera);
+    if (mask) {
+      std::mt19937 random = random_of(seed, among_liquid ? 2 : 3, frame);
+      mask = with_wrong_pixels(std::move(*mask), among_liquid, 0.01 * percent, random);
+    }
+    return mask;
+  };
+}
+
+/// Cleaned first: it is liquid that a segmentation draws too fat or too thin, and not the specks of its noise, which
+/// grown by some pixels would cover the picture.
+inline void grow_masks(int radius_px, TrackingOptions& options) {
+  options.masks = [=](const decant::Recording& recording, std::size_t frame, std::size_t camera) {
+    std::optional<decant::Mask> mask = recording.mask(frame, camera);
+    return mask ? std::optional<decant::Mask>(grown(cleaned(*mask), radius_px)) : std::nullopt;
+  };
+}
+
+}  // namespace detail
+
+/// From little to much, each from where nothing is altered.
+inline const std::vector<Condition>& sweep_conditions() {
+  using decant::Recording;
+  static const std::vector<Condition> all{
+      {"pose_mm",
+       "The container is not where it is said to be",
+       "off by [mm]",
+       {0, 2, 5, 10},
+       false,
+       [](double value, std::uint32_t seed, Recording& recording, TrackingOptions&) {
+         detail::misplace(value, 0, seed, recording);
+       }},
+      {"pose_deg",
+       "The container is not turned as it is said to be",
+       "off by [degrees]",
+       {0, 1, 2.5, 5},
+       false,
+       [](double value, std::uint32_t seed, Recording& recording, TrackingOptions&) {
+         detail::misplace(0, value, seed, recording);
+       }},
+      {"false_positives",
+       "Pixels of the background are taken for liquid",
+       "of the background [%]",
+       {0, 5, 10, 20},
+       true,
+       [](double value, std::uint32_t seed, Recording&, TrackingOptions& options) {
+         detail::flip_pixels(false, value, seed, options);
+       }},
+      {"false_negatives",
+       "Pixels of the liquid are taken for background",
+       "of the liquid [%]",
+       {0, 5, 10, 20},
+       true,
+       [](double value, std::uint32_t seed, Recording&, TrackingOptions& options) {
+         detail::flip_pixels(true, value, seed, options);
+       }},
+      {"dropped",
+       "Frames without a mask",
+       "dropped [%]",
+       {0, 20, 40, 60, 80},
+       true,
+       [](double value, std::uint32_t seed, Recording&, TrackingOptions& options) {
+         options.masks = [=](const Recording& recording, std::size_t frame, std::size_t camera) {
+           // the same numbers for every value: what is dropped at 20 % is dropped at 40 %, too
+           std::mt19937 random = detail::random_of(seed, 4, frame);
+           const bool dropped = std::uniform_real_distribution<double>(0, 100)(random) < value;
+           return dropped ? std::nullopt : recording.mask(frame, camera);
+         };
+       }},
+      {"late",
+       "Masks come late, poses do not",
+       "late by [frames]",
+       {0, 1, 2, 4},
+       true,
+       [](double value, std::uint32_t, Recording&, TrackingOptions& options) {
+         options.masks = [late = static_cast<std::size_t>(value)](const Recording& recording, std::size_t frame,
+                                                                  std::size_t camera) {
+           return frame < late ? std::nullopt : recording.mask(frame - late, camera);
+         };
+       }},
+      {"fat",
+       "Masks are too fat",
+       "too fat by [px]",
+       {0, 1, 2, 3},
+       true,
+       [](double value, std::uint32_t, Recording&, TrackingOptions& options) {
+         detail::grow_masks(static_cast<int>(value), options);
+       }},
+      {"thin",
+       "Masks are too thin",
+       "too thin by [px]",
+       {0, 1, 2, 3},
+       true,
+       [](double value, std::uint32_t, Recording&, TrackingOptions& options) {
+         detail::grow_masks(-static_cast<int>(value), options);
+       }},
+  };
+  return all;
+}
+
+/// How much liquid the model is told there is, over what there is.
+inline const Condition& amount_condition() {
+  static const Condition condition{"amount",
+                                   "The model is told a wrong amount",
+                                   "told over true",
+                                   {1, 0.7, 1.3},
+                                   false,
+                                   [](double value, std::uint32_t, decant::Recording&, TrackingOptions& options) {
+                                     options.initial_amount_factor = value;
+                                   }};
+  return condition;
+}
+
+/// One method on one recording under one condition.
+struct TrackingJob {
+  Pour pour;
+  std::string method;  ///< or perfect_state
+  const Condition* condition = nullptr;
+  double value = 0;
+
+  /// For files and results. A condition's first value is the recording as it is.
+  std::string key() const {
+    return pour.name + "." + method +
+           (altered() ? "." + condition->name + "_" + decant::detail::number_text(value) : "");
+  }
+  bool altered() const { return condition != nullptr && value != condition->values.front(); }
+};
+
+/// The name of a method that is none: a state whose silhouette is the true one. Its score is what the masks' noise
+/// alone takes away.
+inline const std::string perfect_state = "perfect_state";
+
+struct ExperimentOptions {
+  std::filesystem::path folder;                      ///< of the recordings, with results/ in it
+  double model_spacing = TrackingOptions{}.spacing;  ///< [m]
+  double reality_spacing = PourTwin{}.spacing;       ///< [m]
+  double duration = PourTwin{}.duration;             ///< of each recording [s]
+  int threads = 0;                                   ///< how many jobs run side by side; 0: one per core
+  bool again = false;                                ///< computes what is there already anew
+};
+
+/// Calls work(k) for each k from 0 to count - 1 from several threads. The first exception lets no more begin, and is
+/// thrown when all that run have ended.
+inline void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
+  const unsigned wanted =
+      threads > 0 ? static_cast<unsigned>(threads) : std::max(1U, std::thread::hardware_concurrency());
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex guard;
+  const auto loop = [&] {
+    for (std::size_t k = next++; k < count; k = next++) {
+      try {
+        work(k);
+      } catch (...) {
+        const std::lock_guard lock(guard);
+        failure = failure ? failure : std::current_exception();
+        next = count;
+      }
+    }
+  };
+  std::vector<std::thread> workers;
+  for (unsigned k = 0; k < std::min<std::size_t>(wanted, count); ++k) {
+    workers.emplace_back(loop);
+  }
+  for (std::thread& worker : workers) {
+    worker.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+}
+
+/// Makes recordings and runs methods on them, or finds both in its folder.
+class TrackingExperiment {
+ public:
+  /// Throws std::runtime_error where the folder cannot be written to.
+  explicit TrackingExperiment(ExperimentOptions options) : options_(std::move(options)) {
+    decant::detail::make_folder(results_folder());
+    const std::filesystem::path probe = results_folder() / "probe.part";
+    expect_writable(probe);
+    std::filesystem::remove(probe);
+  }
+
+  /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
+  /// is there and was made otherwise.
+  void record(const std::vector<Pour>& pours) {
+    std::vector<Pour> missing;
+    for (Pour each : pours) {
+      each.twin.spacing = options_.reality_spacing;
+      each.twin.duration = options_.duration;
+      each.twin.threads = 1;
+      if (std::filesystem::exists(options_.folder / each.name)) {
+        expect_made_as(each);
+      } else {
+        missing.push_back(std::move(each));
+      }
+    }
+    TogetherProgress progress("recording", missing.size());
+    // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
+    const std::filesystem::path unfinished = options_.folder / "unfinished";
+    side_by_side(missing.size(), options_.threads, [&](std::size_t k) {
+      const std::filesystem::path part = unfinished / missing[k].name;
+      decant::detail::make_folder(unfinished);
+      std::filesystem::remove_all(part);
+      record_pour(missing[k].twin, part, [&](double share) { progress.update(k, share); });
+      std::filesystem::rename(part, options_.folder / missing[k].name);
+    });
+    std::error_code not_empty;
+    std::filesystem::remove(unfinished, not_empty);
+    recorded_ += missing.size();
+  }
+
+  /// Runs what is not there yet; afterwards all have a result().
+  void run(const std::vector<TrackingJob>& jobs) {
+    std::vector<TrackingJob> missing;
+    for (const TrackingJob& job : jobs) {
+      const std::string key = job.key();
+      if (results_.contains(key) ||
+          std::any_of(missing.begin(), missing.end(), [&](const TrackingJob& other) { return other.key() == key; })) {
+        continue;
+      }
+      ++asked_;
+      nlohmann::json kept = options_.again ? nlohmann::json() : read_kept(key);
+      if (kept.is_object() && kept.value("settings", nlohmann::json()) == settings_json(job)) {
+        results_[key] = std::move(kept);
+      } else {
+        missing.push_back(job);
+      }
+    }
+    TogetherProgress progress("tracking", missing.size());
+    std::mutex guard;
+    side_by_side(missing.size(), options_.threads, [&](std::size_t k) {
+      nlohmann::json result = compute(missing[k], [&](double share) { progress.update(k, share); });
+      result["settings"] = settings_json(missing[k]);
+      const std::string key = missing[k].key();
+      const std::filesystem::path part = results_folder() / (key + ".json.part");
+      write_result(part, result);
+      std::filesystem::rename(part, results_folder() / (key + ".json"));
+      const std::lock_guard lock(guard);
+      results_[key] = std::move(result);
+    });
+    computed_ += missing.size();
+  }
+
+  /// Of a job that was run; other keys are an std::out_of_range.
+  const nlohmann::json& result(const TrackingJob& job) const { return results_.at(job.key()); }
+  const std::map<std::string, nlohmann::json>& results() const { return results_; }
+  std::size_t recorded() const { return recorded_; }  ///< recordings that were made
+  std::size_t computed() const { return computed_; }  ///< results that were computed, of those asked() for
+  std::size_t asked() const { return asked_; }
+
+ private:
+  /// One line for many jobs.
+  class TogetherProgress {
+   public:
+    TogetherProgress(const std::string& label, std::size_t jobs)
+        : line_(label, static_cast<double>(jobs)), shares_(jobs, 0.0) {}
+
+    void update(std::size_t job, double share) {
+      const std::lock_guard lock(guard_);
+      done_ += share - shares_[job];
+      finished_ += share >= 1 && shares_[job] < 1 ? 1 : 0;
+      shares_[job] = share;
+      line_.update(done_, std::to_string(finished_) + " of " + std::to_string(shares_.size()) + " done");
+    }
+
+   private:
+    std::mutex guard_;
+    decant::Progress line_;
+    std::vector<double> shares_;
+    double done_ = 0;
+    std::size_t finished_ = 0;
+  };
+
+  std::filesystem::path results_folder() const { return options_.folder / "results"; }
+
+  nlohmann::json read_kept(const std::string& key) const {
+    const std::filesystem::path file = results_folder() / (key + ".json");
+    std::error_code error;
+    return std::filesystem::is_regular_file(file, error)
+               ? nlohmann::json::parse(decant::detail::read_text_file(file, std::size_t{1} << 26), nullptr, false)
+               : nlohmann::json();
+  }
+
+  static nlohmann::json truth_of(const std::filesystem::path& folder) {
+    const std::optional<std::string> text = decant::read_truth(folder);
+    if (!text) {
+      throw std::runtime_error((folder / "recording.json").string() + ": truth is missing, which the scores need");
+    }
+    return nlohmann::json::parse(*text);
+  }
+
+  void expect_made_as(const Pour& wanted) const {
+    const std::filesystem::path folder = options_.folder / wanted.name;
+    const nlohmann::json truth = truth_of(folder);
+    const auto frames = truth.at("volume_ml").at("pan").size();
+    const auto wanted_frames = std::lround(wanted.twin.duration * wanted.twin.frames_per_second);
+    const auto words = [](const std::string& seed, double spacing_mm, auto count) {
+      return "seed " + seed + ", " + decant::detail::number_text(spacing_mm) + " mm, " + std::to_string(count) +
+             " frames";
+    };
+    const std::string is = words(truth.at("seed").dump(), truth.at("spacing_mm").get<double>(), frames);
+    const std::string should_be = words(std::to_string(wanted.twin.seed), 1e3 * wanted.twin.spacing, wanted_frames);
+    if (is != should_be) {
+      decant::detail::refuse_file(folder.string() + ": the recording that is there", should_be, is);
+    }
+  }
+
+  // Forecasts double the time; of altered recordings nobody asks for them.
+  std::vector<double> forecasts(const TrackingJob& job) const {
+    return job.altered() || job.method == perfect_state ? std::vector<double>() : std::vector<double>{0.25, 0.5, 1};
+  }
+
+  // What a result depends on, beside the program.
+  nlohmann::json settings_json(const TrackingJob& job) const {
+    nlohmann::json json;
+    json["job"] = job.key();
+    json["model_spacing_mm"] = 1e3 * options_.model_spacing;
+    json["reality_spacing_mm"] = 1e3 * options_.reality_spacing;
+    json["duration_s"] = options_.duration;
+    json["forecasts_s"] = forecasts(job);
+    return json;
+  }
+
+  struct SharedModel {
+    std::mutex guard;
+    std::optional<TrackingModel> model;
+  };
+
+  // Filling a container takes as long as tracking a second or two; jobs that start alike share it.
+  TrackingModel filled_model(const TrackingJob& job, const decant::Recording& recording,
+                             const TrackingOptions& options) {
+    const bool starts_as_recorded = !job.altered() || job.condition->in_masks;
+    std::shared_ptr<SharedModel> shared;
+    {
+      const std::lock_guard lock(models_guard_);
+      auto& entry =
+          models_[starts_as_recorded ? job.pour.name : TrackingJob{job.pour, "", job.condition, job.value}.key()];
+      if (!entry) {
+        entry = std::make_shared<SharedModel>();
+      }
+      shared = entry;
+    }
+    const std::lock_guard lock(shared->guard);
+    if (!shared->model) {
+      shared->model.emplace(model_of<decant::DefaultParts<>>(recording, options));
+    }
+    return *shared->model;
+  }
+
+  nlohmann::json compute(const TrackingJob& job, const std::function<void(double)>& progress) {
+    const std::filesystem::path folder = options_.folder / job.pour.name, truth_masks = folder / "truth_mask";
+    const nlohmann::json truth = truth_of(folder);
+    decant::Recording recording = decant::read_recording(folder);
+    const auto frames = static_cast<double>(recording.frames);
+    const auto progressed = [&](std::size_t done) { progress(static_cast<double>(done) / frames); };
+    if (job.method == perfect_state) {
+      return score_perfect_state(recording, truth_masks, progressed);
+    }
+    TrackingOptions options;
+    options.spacing = options_.model_spacing;
+    options.forecasts = forecasts(job);
+    options.threads = 1;
+    if (job.altered()) {
+      job.condition->apply(job.value, job.pour.twin.seed, recording, options);
+    }
+    const TrackingModel model = filled_model(job, recording, options);
+    const TrackingResult result = tracking_method(job.method)(recording, model, options, truth_masks, progressed);
+    progress(1);  // also where a method stopped early
+    nlohmann::json json = tracking_json(result, recording, options.forecasts);
+    json["pixels"] = pixels_json(result.posterior);
+    json["truth_iou_mean"] = number_json(result.against_truth.mean_over_frames());
+    json["truth_iou_pooled"] = number_json(result.against_truth.pooled_over_pixels());
+    json["truth_prior_iou"] = number_json(result.prior_against_truth.mean_over_frames());
+    json["truth_pixels"] = pixels_json(result.against_truth);
+    json["true_initial_ml"] = truth.at("initial_ml");
+    for (const auto& [body, volumes] : truth.at("volume_ml").items()) {
+      json["true_volume_ml"][body] = volumes;
+    }
+    return json;
+  }
+
+  static nlohmann::json pixels_json(const decant::OverlapScore& score) {
+    return {{"both", score.pixels().both_px}, {"union", score.pixels().union_px()}};
+  }
+
+  static nlohmann::json score_perfect_state(const decant::Recording& recording,
+                                            const std::filesystem::path& truth_masks,
+                                            const std::function<void(std::size_t)>& progress) {
+    decant::OverlapScore score;
+    for (std::size_t frame = 0; frame < recording.frames; ++frame) {
+      if (const std::optional<decant::Mask> mask = recording.mask(frame)) {
+        const decant::Mask truth = decant::read_png_grey8(truth_masks / (decant::detail::six_digits(frame) + ".png"));
+        score.add(decant::overlap(truth, detail::cleaned(*mask)));
+      }
+      progress(frame + 1);
+    }
+    nlohmann::json json;
+    json["iou_mean"] = json["prior_iou"] = number_json(score.mean_over_frames());
+    json["iou_pooled"] = number_json(score.pooled_over_pixels());
+    json["pixels"] = pixels_json(score);
+    json["status"] = "ok";
+    return json;
+  }
+
+  ExperimentOptions options_;
+  std::map<std::string, nlohmann::json> results_;
+  std::mutex models_guard_;
+  std::map<std::string, std::shared_ptr<SharedModel>> models_;
+  std::size_t recorded_ = 0, computed_ = 0, asked_ = 0;
+};
+
+}  // namespace example
