@@ -1,21 +1,30 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# From a bare machine to a simulation beside its measurement: installs what is missing, builds one example in build/
-# and replays a motion with which a robot carried a cylinder of water. Arguments go to
-# replay_motion in place of that motion: ./quickstart.sh --help
+# From a bare machine to a liquid that is kept in step with a camera: installs what is missing, builds two programs in
+# build/, tracks the small recording of a pour in examples/data, and replays a motion with which a robot carried a
+# cylinder of water beside what was measured. Arguments go to `track` in place of that recording, and nothing is
+# replayed: ./quickstart.sh --help
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")"
 ./cmake/install_dependencies.sh
 cmake -S . -B build -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=OFF -DDECANT_BUILD_EXAMPLES=ON \
   -DDECANT_BUILD_BENCHMARKS=OFF
-cmake --build build --target replay_motion
+cmake --build build --target track replay_motion
 
-results=build/replay
+results=build/quickstart
 mkdir -p "$results"
-motion=TRD_2D_0.3m_2.4s_270deg
-if (($# == 0)); then
-  set -- --poses "examples/data/pose_$motion.csv" --heights "examples/data/height_$motion.csv" \
-    --radius-mm 49 --depth-mm 78 --spacing-mm 5 --json "$results/result.json" --report "$results/report.html" --vtk "$results/vtk"
+if (($# > 0)); then
+  exec build/examples/track "$@"
 fi
-build/examples/replay_motion "$@"
+echo
+echo "A pour, seen by a camera: simulation alone, and corrected by what the camera sees"
+build/examples/track examples/data/pour_cup --corrector open_loop,map_filter_mended,default --no-forecasts \
+  --json "$results/track.json" --report "$results/track.html"
+
+echo
+echo "A cylinder of water, carried by a robot: simulated and measured height"
+motion=TRD_2D_0.3m_2.4s_270deg
+build/examples/replay_motion --poses "examples/data/pose_$motion.csv" --heights "examples/data/height_$motion.csv" \
+  --radius-mm 49 --depth-mm 78 --spacing-mm 5 --json "$results/replay.json" --report "$results/replay.html" \
+  --vtk "$results/vtk"

@@ -30,7 +30,9 @@ std::vector<Value> array_of(const std::string& file, const std::string& name, co
   std::memcpy(&bytes, file.data() + data, sizeof bytes);
   REQUIRE(data + sizeof bytes + bytes <= file.size());
   std::vector<Value> values(bytes / sizeof(Value));
-  std::memcpy(values.data(), file.data() + data + sizeof bytes, bytes);
+  if (bytes > 0) {
+    std::memcpy(values.data(), file.data() + data + sizeof bytes, bytes);
+  }
   return values;
 }
 
