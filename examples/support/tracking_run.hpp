@@ -143,44 +143,6 @@ decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Mode
   return decant::PoseTrack(std::move(samples));
 }
 
-/// A corrector that also keeps the first camera's silhouette of before the correction, which the tracker draws over.
-template <class CorrectorType>
-class PriorKeeper {
- public:
-  using Scalar = typename CorrectorType::Scalar;
-  using Observation = typename CorrectorType::Observation;
-
-  explicit PriorKeeper(CorrectorType corrector) : corrector_(std::move(corrector)) {}
-
-  int passes() const noexcept {
-    if constexpr (requires { corrector_.passes(); }) {
-      return corrector_.passes();
-    } else {
-      return 1;
-    }
-  }
-
-  decant::CorrectionReport correct(decant::FluidState<Scalar>& fluid, const Observation& seen, Scalar dt) noexcept {
-    for (const auto& view : seen.views) {
-      if (seen.pass == 0 && view.number == 0) {
-        prior_ = *view.predicted;
-        kept_ = true;
-      }
-    }
-    return corrector_.correct(fluid, seen, dt);
-  }
-
-  void reset() noexcept { corrector_.reset(); }
-
-  /// Since the last call; nothing where no correction was made.
-  const decant::Mask* take_prior() noexcept { return std::exchange(kept_, false) ? &prior_ : nullptr; }
-
- private:
-  CorrectorType corrector_;
-  decant::Mask prior_{};
-  bool kept_ = false;
-};
-
 /// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for
 /// scoring.
 template <class Model, class CorrectorType>
@@ -192,8 +154,7 @@ TrackingResult track_recording(
   TrackerSettings settings;
   settings.gravity = recording.gravity;
   settings.threads = {options.threads};
-  using Watched = PriorKeeper<CorrectorType>;
-  Tracker<Model, Watched> tracker(model, Watched(std::move(corrector)), settings);
+  Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
   for (const recording::Camera& camera : recording.cameras) {
     const recording::View& view = camera.view(0);
     tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
@@ -248,8 +209,7 @@ TrackingResult track_recording(
     if (!truth_masks.empty()) {
       const auto file = truth_masks / (decant::detail::six_digits(frame) + ".png");
       const Mask truth = read_png_grey8(file);
-      const Mask* prior = tracker.corrector().take_prior();
-      result.prior_against_truth.add(overlap(prior != nullptr ? *prior : tracker.predicted(0), truth));
+      result.prior_against_truth.add(overlap(tracker.predicted_before(0), truth));
       result.against_truth.add(overlap(tracker.predicted(0), truth));
     }
     for (std::size_t k = 0; k < options.forecasts.size(); ++k) {

@@ -171,6 +171,25 @@ TEST_CASE("MAP filter: liquid that is beside where it is seen goes there in a fe
   CHECK(fluid.position == start.position);
 }
 
+TEST_CASE("MAP filter: liquid at the picture's edge does not leave it, and an empty mask moves nothing") {
+  auto fluid = liquid_block<double>({0, 0, 0});
+  fluid.resize(1);
+  // half a pixel within the right edge of 200 columns: 500 px per metre at half a metre's depth
+  fluid.position.col(0) << 0.0995, 0, 0;
+  const auto start = fluid;
+  Eye<double> eye(decant_test::before_the_block()), other(decant_test::beside_the_block());
+  eye.observed.block(70, 20, 10, 10).setConstant(decant::mask_liquid);  // far to the left, beyond the reach
+  other.observed.setConstant(decant::mask_liquid);
+  decant::MapFilter<double> filter;
+  correct(filter, fluid, std::array{&eye, &other});
+  CHECK(eye.sight.camera().project(Vector3<double>(fluid.position.col(0))).visible);
+
+  fluid = start;
+  eye.observed.setZero();
+  CHECK(correct(filter, fluid, std::array{&eye}).moved == 0);
+  CHECK(fluid.position == start.position);
+}
+
 TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a velocity that follows") {
   auto fluid = liquid_block<double>({0, 0, 0});
   fluid.resize(1);

@@ -171,6 +171,8 @@ TEST_CASE("tracker: a drop that really falls more slowly is followed, and its sp
       const std::vector<CameraMask> masks{{0, mask}};
       report = tracker.track({t, {}, masks});
       REQUIRE(report.status == FrameStatus::Ok);
+      REQUIRE(decant::overlap(tracker.predicted_before(0), tracker.observed(0)).both_px == report.prior.both_px);
+      REQUIRE(decant::overlap(tracker.predicted(0), tracker.observed(0)).both_px == report.posterior.both_px);
     }
     return std::pair{report, tracker.model()};
   };

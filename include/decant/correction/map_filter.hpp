@@ -7,7 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
+#include <numbers>
+#include <optional>
 #include <vector>
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
@@ -34,11 +35,12 @@ struct MapFilterSettings {
 
 /// What is printed in Schenck and Fox 2017 (MapFilterSchenck2017) takes the most active of 27 hypotheses, and the most
 /// active one is hardly ever to stay. Here a hypothesis D for a particle at x weighs
-///   -E(x + D)^2 / (2 edge^2)  +  pull U(x + D)  -  |D|^2 / (2 step^2),    summed over cameras but for the last,
+///   sum over cameras of [ -E(x + D)^2 / (2 edge^2)  +  pull U(x + D) ]  -  |D|^2 / (2 step^2),
 /// with E the distance in the image to observed liquid, cut off at the reach, and U the share of unexplained liquid
 /// (observed, not predicted) around it, weighed by exp(-(d / length)^2). If prediction and observation agree, E and U
 /// are zero where the particles are, and all of them stay. Several passes, each drawn anew, from coarse to fine.
-/// Particles that no camera sees stay; of equal hypotheses the nearest wins.
+/// Particles that no camera sees stay, and none is taken out of a picture that shows it; of equal hypotheses the nearest
+/// wins.
 template <class ScalarType = float, class CameraType = DistortedPinholeCamera>
 class MapFilter {
  public:
@@ -124,37 +126,40 @@ class MapFilter {
                          .select(Mask::Constant(observed.rows(), observed.cols(), mask_liquid),
                                  Mask::Zero(observed.rows(), observed.cols()));
       const ImageKernel kernel{settings.pull_length_px, 3 * settings.pull_length_px};
-      if (field_.empty() || field_[0].width() != observed.cols() || field_[0].height() != observed.rows()) {
-        field_.assign(1, ActivationField(static_cast<int>(observed.cols()), static_cast<int>(observed.rows()), kernel));
+      if (!field_ || field_->width() != observed.cols() || field_->height() != observed.rows()) {
+        field_.emplace(static_cast<int>(observed.cols()), static_cast<int>(observed.rows()), kernel);
         none_ = Image<float>::Zero(observed.rows(), observed.cols());
       }
-      field_[0].rebuild(unexplained_, none_, threads);
+      field_->rebuild(unexplained_, none_, threads);
     }
 
     double log_likelihood(const Eigen::Vector2d& pixel, const Settings& settings) const noexcept {
       const double length = settings.pull_length_px;
-      const double off = std::min(distance(pixel), settings.reach_px) / settings.edge_px;
-      return -0.5 * off * off + settings.pull * field_[0].value(pixel) / (3.14159265358979 * length * length);
+      const double off = distance(pixel, settings.reach_px) / settings.edge_px;
+      return -0.5 * off * off + settings.pull * field_->value(pixel) / (std::numbers::pi * length * length);
     }
 
    private:
-    /// Between pixels, too: what lies between whole pixels would not pull otherwise.
-    double distance(const Eigen::Vector2d& pixel) const noexcept {
+    /// Between pixels, too: what lies between whole pixels would not pull otherwise. Cut off before it is interpolated,
+    /// since it is infinite where no liquid was seen at all.
+    double distance(const Eigen::Vector2d& pixel, double reach_px) const noexcept {
       const Image<float>& table = to_observed_.distance_px();
       const double x = std::clamp(pixel.x(), 0.0, static_cast<double>(table.cols() - 1));
       const double y = std::clamp(pixel.y(), 0.0, static_cast<double>(table.rows() - 1));
-      const auto left = std::min(static_cast<Index>(x), table.cols() - 2),
-                 top = std::min(static_cast<Index>(y), table.rows() - 2);
+      const auto left = static_cast<Index>(x), top = static_cast<Index>(y);
+      const Index beside = std::min(left + 1, table.cols() - 1), below = std::min(top + 1, table.rows() - 1);
       const double right = x - static_cast<double>(left), lower = y - static_cast<double>(top);
-      const auto at = [&](Index row, Index column) { return static_cast<double>(table(row, column)); };
-      return (1 - lower) * ((1 - right) * at(top, left) + right * at(top, left + 1)) +
-             lower * ((1 - right) * at(top + 1, left) + right * at(top + 1, left + 1));
+      const auto at = [&](Index row, Index column) {
+        return std::min(static_cast<double>(table(row, column)), reach_px);
+      };
+      return (1 - lower) * ((1 - right) * at(top, left) + right * at(top, beside)) +
+             lower * ((1 - right) * at(below, left) + right * at(below, beside));
     }
 
     SilhouetteDistance to_observed_{};
     Mask unexplained_{};
     Image<float> none_{};
-    std::vector<ActivationField> field_{};
+    std::optional<ActivationField> field_{};
   };
 
   Move best_move(const Vector3<double>& x, Index i, double cell, const Observation& seen) const noexcept {
@@ -163,12 +168,13 @@ class MapFilter {
     for (std::size_t hypothesis = 0; hypothesis < offsets_.size(); ++hypothesis) {
       const Vector3<double> offset = cell * offsets_[hypothesis];
       double total = -0.5 * offset.squaredNorm() / (settings_.step * settings_.step), length_px = 0;
-      bool visible = false;
+      bool visible = false, leaves = false;
       for (std::size_t k = 0; k < seen.views.size(); ++k) {
         if (seen.views[k].hidden[static_cast<std::size_t>(i)] != 0) {
           continue;
         }
         const Projection from = seen.views[k].camera().project(x), to = seen.views[k].camera().project(x + offset);
+        leaves = leaves || (from.visible && !to.visible);
         if (from.visible && to.visible) {
           total += evidence_[k].log_likelihood(to.pixel, settings_);
           length_px = std::max(length_px, (to.pixel - from.pixel).norm());
@@ -180,7 +186,7 @@ class MapFilter {
           return best;
         }
         largest = total;
-      } else if (visible && total > largest + 1e-9 && !seen.views.front().sight->blocked(x, x + offset)) {
+      } else if (!leaves && total > largest + 1e-9 && !seen.views.front().sight->blocked(x, x + offset)) {
         largest = total;
         best = {offset, length_px};
       }

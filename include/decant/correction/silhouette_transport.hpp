@@ -245,8 +245,8 @@ class SilhouetteTransport {
     }
   }
 
-  /// What each node is matched with: the mean place by the weights K scale, and their sum. The sum stays in product_,
-  /// what the places are multiplied with in x and y.
+  /// Adds to the shifts, with a sign, the mean place that each node is matched with by the weights K scale. @param total
+  /// gets the sum of the weights.
   void add_matches(const Silhouette& silhouette, double sign, Grid& total) {
     const auto moment = [&](Index axis, Grid& shift) {
       moments_.resize(silhouette.scale.size());

@@ -224,6 +224,8 @@ class Tracker {
 
   /// As of the last frame: what the simulation says the camera sees, and what it saw, cleaned.
   const Mask& predicted(std::size_t camera) const { return eyes_.at(camera).predicted; }
+  /// The same before the frame's correction.
+  const Mask& predicted_before(std::size_t camera) const { return eyes_.at(camera).prior; }
   const Mask& observed(std::size_t camera) const { return eyes_.at(camera).observed; }
 
   /// The silhouette of a model's liquid in one of the cameras, with the bodies where that model has them: for
@@ -256,7 +258,7 @@ class Tracker {
     Silhouette<DiscSplat<Scalar>> silhouette;
     MaskCleaning cleaning;
     MaskTrust trust;
-    Mask observed, predicted;
+    Mask observed, predicted, prior;
     std::vector<std::uint8_t> hidden{};
     bool has_mask = false, believed = false;
 
@@ -267,7 +269,8 @@ class Tracker {
           cleaning(settings.cleaning_window_px, settings.smallest_region_px),
           trust(settings.least_pixels),
           observed(Mask::Zero(camera.height(), camera.width())),
-          predicted(observed) {
+          predicted(observed),
+          prior(observed) {
       occlusion.add_bodies(model.bodies(), model.time());
     }
   };
@@ -300,6 +303,7 @@ class Tracker {
     for (std::size_t camera = 0; camera < eyes_.size(); ++camera) {
       Eye& eye = eyes_[camera];
       draw(model_, eye, eye.predicted);
+      eye.prior = eye.predicted;
       if (eye.believed) {
         views_.push_back(
             {&eye.occlusion, &eye.observed, &eye.predicted, &eye.silhouette.coverage(), eye.hidden, camera});
