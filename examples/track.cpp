@@ -64,7 +64,7 @@ int main(int count, char** values) {
       example::expect_writable(report_file);
     }
     const decant::Recording recording = decant::read_recording(folder);
-    const example::TrackingModel model = example::model_of<decant::DefaultParts<>>(recording, options);
+    const example::TrackingModel model = example::model_of<example::TrackingParts>(recording, options);
     std::printf("%s: %zu frames, %td particles of %.1f mm\n%-12s %6s %6s %6s %6s %8s\n", recording.name.c_str(),
                 recording.frames, model.fluid().size(), spacing_mm, "", "IoU", "pooled", "prior", "+0.5 s", "frames/s");
     for (const std::string& name : names) {

@@ -24,6 +24,7 @@
 #include <decant/boundary/shapes.hpp>
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/camera/ray_occlusion.hpp>
+#include <decant/force/linear_drag.hpp>
 #include <decant/io/png.hpp>
 #include <decant/io/recording_writer.hpp>
 #include <decant/kernel/wendland_c2.hpp>
@@ -115,26 +116,11 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   return hidden;
 }
 
-/// Slows all motion, a = -rate v.
-struct Drag {
-  using Scalar = float;
-  Scalar rate = 0;  ///< [1/s]
-
-  template <class Step>
-  void accumulate(const Step& step, decant::PointArray<Scalar>& acceleration) noexcept {
-    decant::parallel_for(step.fluid.size(), step.threads,
-                         [&](decant::Index i) { acceleration.col(i) -= rate * step.fluid.velocity.col(i); });
-  }
-  template <class Step>
-  Scalar largest_step(const Step&) const noexcept {
-    return rate > 0 ? Scalar(0.1) / rate : std::numeric_limits<Scalar>::infinity();
-  }
-};
-
 template <class PressureSolverType>
 struct RealityParts : decant::DefaultParts<float> {
   using Kernel = decant::WendlandC2<float>;
-  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>, Drag>;
+  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
+                            decant::LinearDrag<float>>;
   using PressureSolver = PressureSolverType;
 };
 
@@ -304,7 +290,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   const BodyId pan = reality.add_body("pan", pour_pan());
   constexpr bool foreign = !std::is_same_v<Parts, DefaultParts<float>>;
   if constexpr (foreign) {
-    reality.template force<Drag>().rate = static_cast<float>(hidden.drag);
+    reality.template force<LinearDrag<float>>().rate = static_cast<float>(hidden.drag);
   }
   if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
     StateEquation<float>& solver = reality.pressure_solver();

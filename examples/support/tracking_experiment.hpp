@@ -522,7 +522,7 @@ class TrackingExperiment {
     }
     const std::lock_guard lock(shared->guard);
     if (!shared->model) {
-      shared->model.emplace(model_of<decant::DefaultParts<>>(recording, options));
+      shared->model.emplace(model_of<TrackingParts>(recording, options));
     }
     return *shared->model;
   }

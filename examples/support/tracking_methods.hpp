@@ -4,6 +4,7 @@
 /// The methods that track a recording, by the names that scripts use, and what each comes to as JSON.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <filesystem>
@@ -29,9 +30,8 @@
 
 namespace example {
 
-using TrackingModel = decant::LiquidSimulator;
-
-/// A corrector, tried on a recording from beginning to end; see track_recording.
+/// A method, tried on a recording from beginning to end; see track_recording. The model is filled as the recording and
+/// the options say.
 using TrackingMethod =
     std::function<TrackingResult(const decant::Recording&, const TrackingModel&, const TrackingOptions&,
                                  const std::filesystem::path&, const std::function<void(std::size_t)>&)>;
@@ -40,8 +40,75 @@ template <class CorrectorType>
 TrackingMethod method_of() {
   return [](const decant::Recording& recording, const TrackingModel& model, const TrackingOptions& options,
             const std::filesystem::path& truth_masks, const std::function<void(std::size_t)>& progress) {
-    return track_recording(recording, model, CorrectorType(), options, truth_masks, progress);
+    return track_recording(recording, tracker_for(recording, model, CorrectorType(), options), options, truth_masks,
+                           progress);
   };
+}
+
+/// What may be wrong with the model of a pour: a table that is not level or an air stream, friction of the air, a
+/// thicker liquid; and poses that come late, which FixedLagTracker knows by itself.
+inline std::vector<decant::UncertainParameter<TrackingModel>> uncertain_parameters(const decant::Recording& recording) {
+  const decant::Vector3<float> gravity = recording.gravity.cast<float>();
+  const auto nu = static_cast<float>(recording.liquid.viscosity / recording.liquid.density);
+  // an axis across gravity, and the other one
+  decant::Vector3<float> x = decant::Vector3<float>::UnitX();
+  if (gravity.norm() > 0) {
+    x = (x - x.dot(gravity) / gravity.squaredNorm() * gravity).normalized();
+  }
+  const decant::Vector3<float> y = gravity.norm() > 0 ? decant::Vector3<float>(x.cross(gravity).normalized())
+                                                      : decant::Vector3<float>(decant::Vector3<float>::UnitY());
+  using Gravity = decant::Gravity<float>;
+  // the first parameter starts from what the recording says, the second one adds to it
+  return {
+      {"pull along x [m/s^2]", 0.5,
+       [=](TrackingModel& model, double pull) {
+         model.force<Gravity>().acceleration = gravity + static_cast<float>(pull) * x;
+       }},
+      {"pull along y [m/s^2]", 0.5,
+       [=](TrackingModel& model, double pull) { model.force<Gravity>().acceleration += static_cast<float>(pull) * y; }},
+      {"drag [1/s]", 1.2,
+       [](TrackingModel& model, double drag) {
+         model.force<decant::LinearDrag<float>>().rate = static_cast<float>(std::max(0.0, drag));
+       }},
+      {"viscosity [decades]", 1, [=](TrackingModel& model, double decades) {
+         // half a decade per deviation and step of 1e-5 m^2/s, below which particles of some millimetres feel none
+         const double thickened = 1e-5 * (std::pow(10.0, std::max(0.0, decades)) - 1);
+         model.force<decant::Viscosity<float>>().kinematic_viscosity = nu + static_cast<float>(thickened);
+       }}};
+}
+
+/// The default corrector, with parameters adapted as it runs.
+inline TrackingResult track_adapting(const decant::Recording& recording, const TrackingModel& model,
+                                     const TrackingOptions& options, const std::filesystem::path& truth_masks,
+                                     const std::function<void(std::size_t)>& progress) {
+  decant::FixedLagSettings settings;
+  settings.threads = {options.threads};
+  TrackingResult result =
+      track_recording(recording,
+                      decant::FixedLagTracker(tracker_for(recording, model, decant::SilhouetteCorrector<>(), options),
+                                              uncertain_parameters(recording), settings),
+                      options, truth_masks, progress);
+  return result;
+}
+
+/// The default corrector from each of several initial amounts, around what the recording says; the most probable one
+/// is followed.
+inline TrackingResult track_amounts(const decant::Recording& recording, const TrackingModel& model,
+                                    const TrackingOptions& options, const std::filesystem::path& truth_masks,
+                                    const std::function<void(std::size_t)>& progress) {
+  const double told = options.initial_amount_factor, ratio = 1.13, deviation = 0.3;  // of the amount's logarithm
+  decant::HypothesisFilterSettings settings;
+  settings.threads = {options.threads};
+  decant::HypothesisFilter<decant::Tracker<TrackingModel, decant::SilhouetteCorrector<>>> filter(settings);
+  for (int k = -4; k <= 4; ++k) {
+    TrackingOptions other = options;
+    other.initial_amount_factor = told * std::pow(ratio, k);
+    const double off = k * std::log(ratio) / deviation;
+    filter.add(tracker_for(recording, k == 0 ? model : model_of<TrackingParts>(recording, other),
+                           decant::SilhouetteCorrector<>(), options),
+               -0.5 * off * off);
+  }
+  return track_recording(recording, std::move(filter), options, truth_masks, progress);
 }
 
 /// By the names that scripts use. The two of the paper are as printed.
@@ -53,6 +120,8 @@ inline const std::vector<std::pair<std::string, TrackingMethod>>& tracking_metho
       {"warp_field", method_of<decant::WarpFieldSchenck2017<>>()},
       {"transport", method_of<decant::TransportCorrector<>>()},
       {"default", method_of<decant::SilhouetteCorrector<>>()},
+      {"default_adapting", track_adapting},
+      {"default_amounts", track_amounts},
   };
   return all;
 }
@@ -95,6 +164,15 @@ inline nlohmann::json tracking_json(const TrackingResult& result, const decant::
   const double seconds = 1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
   json["frames_per_second"] = number_json(static_cast<double>(result.frames) / seconds);
   json["relocated_ml"] = result.relocated_ml;
+  for (const auto& [name, value] : result.parameters) {
+    json["parameters"][name] = number_json(value);
+  }
+  if (result.initial_ml) {
+    json["initial_ml"] = {{"mean", result.initial_ml->mean},
+                          {"low_90", result.initial_ml->low},
+                          {"high_90", result.initial_ml->high},
+                          {"at_end", result.initial_ml->at_end}};
+  }
   json["particles"] = result.particles;
   json["status"] = result.status;
   return json;

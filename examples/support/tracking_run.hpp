@@ -10,20 +10,27 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
+#include <decant/force/linear_drag.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/contents.hpp>
 #include <decant/simulation/fill.hpp>
+#include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
+#include <decant/tracking/fixed_lag_tracker.hpp>
+#include <decant/tracking/hypothesis_filter.hpp>
 #include <decant/tracking/overlap_score.hpp>
 #include <decant/tracking/tracker.hpp>
+#include <decant/tracking/value_estimate.hpp>
 
 namespace example {
 
@@ -61,6 +68,8 @@ struct TrackingResult {
   double relocated_ml = 0;
   double physics_ms = 0, drawing_ms = 0, correction_ms = 0, relaxation_ms = 0;  ///< all frames together
   std::vector<Overlay> overlays;  ///< per frame, where the options ask for them and there is a camera
+  std::vector<std::pair<std::string, double>> parameters;  ///< of the model, where a method adapts them
+  std::optional<decant::ValueEstimate> initial_ml;         ///< where a method estimates it
   std::size_t frames = 0;
   decant::Index particles = 0;
   std::string status = "ok";
@@ -99,6 +108,13 @@ inline decant::DistortedPinholeCamera camera_of(const decant::recording::View& v
   return {decant::PinholeCamera(view.fx, view.fy, view.cx, view.cy, width, height), {d[0], d[1], d[2], d[3], d[4]}};
 }
 
+/// What is tracked with: the default simulator, and a friction that is nothing unless it is adapted.
+struct TrackingParts : decant::DefaultParts<float> {
+  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
+                            decant::LinearDrag<float>>;
+};
+using TrackingModel = decant::Simulator<TrackingParts>;
+
 /// The model as a recording says that it starts. Throws std::invalid_argument if the amount of liquid is not known.
 template <class Parts>
 decant::Simulator<Parts> model_of(const decant::Recording& recording, const TrackingOptions& options) {
@@ -121,6 +137,9 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
     FillAmount amount =
         initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction) : FillAmount::volume(*initial.volume);
     amount.value *= options.initial_amount_factor;
+    if (initial.fill_fraction) {
+      amount.value = std::min(amount.value, 1.0);
+    }
     if (amount.value > 0) {
       decant::fill(model, static_cast<BodyId>(initial.body), amount);
     }
@@ -142,27 +161,138 @@ decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Mode
   }
   return decant::PoseTrack(std::move(samples));
 }
-
-/// Tracks the recording from beginning to end. @param truth_masks folder with masks that are free of noise, for
-/// scoring.
+/// What follows a recording, as forecasts and scores see it: a tracker, by itself or the one that is in use.
 template <class Model, class CorrectorType>
+decant::Tracker<Model, CorrectorType>& tracker_of(decant::Tracker<Model, CorrectorType>& tracker) {
+  return tracker;
+}
+template <class TrackerType>
+TrackerType& tracker_of(decant::FixedLagTracker<TrackerType>& follower) {
+  return follower.tracker();
+}
+template <class TrackerType>
+TrackerType& tracker_of(decant::HypothesisFilter<TrackerType>& follower) {
+  return follower.tracker(follower.best());
+}
+
+/// How late the recorded poses are, as far as the follower knows [s].
+template <class Follower>
+double pose_delay_of(const Follower& follower) {
+  if constexpr (requires { follower.pose_delay(); }) {
+    return follower.pose_delay();
+  } else {
+    return 0;
+  }
+}
+
+/// Amounts of liquid that a follower starts with [ml]: one, or that of each hypothesis.
+template <class Follower>
+std::vector<double> initial_ml_of(Follower& follower) {
+  const auto volume = [](auto& model) {
+    return 1e6 * static_cast<double>(model.fluid().size()) * std::pow(model.spacing(), 3);
+  };
+  if constexpr (requires { follower.log_posterior(0); }) {
+    std::vector<double> all;
+    for (std::size_t k = 0; k < follower.size(); ++k) {
+      all.push_back(volume(follower.tracker(k).model()));
+    }
+    return all;
+  } else {
+    return {volume(tracker_of(follower).model())};
+  }
+}
+
+template <class TrackerType>
+void say_estimates(const TrackerType&, const std::vector<double>&, TrackingResult&) {}
+template <class TrackerType>
+void say_estimates(const decant::FixedLagTracker<TrackerType>& follower, const std::vector<double>&,
+                   TrackingResult& result) {
+  for (std::size_t k = 0; k < follower.parameters().size(); ++k) {
+    result.parameters.emplace_back(follower.parameters()[k].name, follower.value(k));
+  }
+  result.parameters.emplace_back("delay of poses [s]", follower.pose_delay());
+}
+/// Hypotheses of the initial amount, in any order.
+template <class TrackerType>
+void say_estimates(const decant::HypothesisFilter<TrackerType>& follower, const std::vector<double>& initial_ml,
+                   TrackingResult& result) {
+  std::vector<std::pair<double, double>> by_amount;
+  for (std::size_t k = 0; k < follower.size(); ++k) {
+    by_amount.emplace_back(initial_ml[k], follower.log_posterior(k));
+  }
+  std::sort(by_amount.begin(), by_amount.end());
+  std::vector<double> amount, log_density;
+  for (const auto& [ml, log_posterior] : by_amount) {
+    if (amount.empty() || ml > amount.back()) {
+      amount.push_back(ml);
+      log_density.push_back(log_posterior);
+    }
+  }
+  result.initial_ml = decant::estimate_value(amount, log_density);
+}
+
+/// Scores a copy of the model that runs ahead of a frame, uncorrected, with the bodies moving as recorded.
+/// @param start recorded times minus those of the model [s].
+template <class Follower>
+void add_forecasts(const decant::Recording& recording, std::size_t frame, double start, const TrackingOptions& options,
+                   Follower& follower, TrackingResult& result) {
+  using namespace decant;
+  auto& tracker = tracker_of(follower);
+  std::vector<std::size_t> nearest_first(options.forecasts.size());
+  std::iota(nearest_first.begin(), nearest_first.end(), std::size_t{0});
+  std::sort(nearest_first.begin(), nearest_first.end(),
+            [&](std::size_t a, std::size_t b) { return options.forecasts[a] < options.forecasts[b]; });
+  auto future = tracker.model();
+  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+    const auto id = static_cast<BodyId>(body);
+    future.set_motion(id, shifted(recording.bodies[body].motion, -start - pose_delay_of(follower), future, id));
+  }
+  Mask seen(recording.height, recording.width), forecast;
+  for (const std::size_t k : nearest_first) {
+    const auto target = static_cast<std::size_t>(
+        std::lround(static_cast<double>(frame) + options.forecasts[k] * recording.frames_per_second));
+    const std::optional<Mask> mask = target < recording.frames ? recording.mask(target, 0) : std::nullopt;
+    if (!mask) {
+      continue;
+    }
+    if (!future.step(recording.timestamps[target] - start - future.time()).advanced()) {
+      return;
+    }
+    const TrackerSettings& settings = tracker.settings();
+    MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(*mask, seen);
+    tracker.predict(future, 0, forecast);
+    result.forecasts[k].add(overlap(forecast, seen));
+  }
+}
+
+/// A tracker with the recording's cameras.
+template <class CorrectorType, class Model>
+decant::Tracker<Model, CorrectorType> tracker_for(const decant::Recording& recording, const Model& model,
+                                                  CorrectorType corrector, const TrackingOptions& options) {
+  decant::TrackerSettings settings;
+  settings.gravity = recording.gravity;
+  settings.threads = {options.threads};
+  decant::Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
+  for (const decant::recording::Camera& camera : recording.cameras) {
+    const decant::recording::View& view = camera.view(0);
+    tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
+  }
+  return tracker;
+}
+
+/// Tracks the recording from beginning to end. @param follower a Tracker, or what has trackers within. @param
+/// truth_masks folder with masks that are free of noise, for scoring.
+template <class Follower>
 TrackingResult track_recording(
-    const decant::Recording& recording, const Model& model, CorrectorType corrector, const TrackingOptions& options,
+    const decant::Recording& recording, Follower follower, const TrackingOptions& options,
     const std::filesystem::path& truth_masks = {},
     const std::function<void(std::size_t)>& progress = [](std::size_t) {}) {
   using namespace decant;
-  TrackerSettings settings;
-  settings.gravity = recording.gravity;
-  settings.threads = {options.threads};
-  Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
-  for (const recording::Camera& camera : recording.cameras) {
-    const recording::View& view = camera.view(0);
-    tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
-  }
   TrackingResult result;
   result.forecasts.resize(options.forecasts.size());
   result.volume_ml.resize(recording.bodies.size());
-  const double start = recording.timestamps.front() - model.time();
+  const std::vector<double> initial_ml = initial_ml_of(follower);
+  const double start = recording.timestamps.front() - tracker_of(follower).model().time();
   std::vector<TrackedPose> poses(recording.bodies.size());
   for (std::size_t frame = 0; frame < recording.frames; ++frame) {
     const double time = recording.timestamps[frame];
@@ -171,20 +301,22 @@ TrackingResult track_recording(
     }
     std::vector<Mask> kept;
     std::vector<CameraMask> masks;
+    std::vector<CameraPose> cameras;
     kept.reserve(recording.cameras.size());
     for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
-      tracker.set_camera_pose(camera, recording.cameras[camera].view(frame).camera_from_world);
+      cameras.push_back({camera, recording.cameras[camera].view(frame).camera_from_world});
       if (std::optional<Mask> mask =
               options.masks ? options.masks(recording, frame, camera) : recording.mask(frame, camera)) {
         kept.push_back(std::move(*mask));
         masks.push_back({camera, kept.back()});
       }
     }
-    const FrameReport report = tracker.track({time - start, poses, masks});
+    const FrameReport report = follower.track({time - start, poses, masks, cameras});
     if (!report.advanced()) {
       result.status = std::string(to_string(report.status)) + " in frame " + std::to_string(frame);
       break;
     }
+    auto& tracker = tracker_of(follower);
     ++result.frames;
     result.iou.push_back(report.posterior.iou());
     result.prior_iou.push_back(report.prior.iou());
@@ -212,33 +344,16 @@ TrackingResult track_recording(
       result.prior_against_truth.add(overlap(tracker.predicted_before(0), truth));
       result.against_truth.add(overlap(tracker.predicted(0), truth));
     }
-    for (std::size_t k = 0; k < options.forecasts.size(); ++k) {
-      const double ahead = options.forecasts[k];
-      const auto target =
-          static_cast<std::size_t>(std::lround(static_cast<double>(frame) + ahead * recording.frames_per_second));
-      if (frame % static_cast<std::size_t>(options.frames_between_forecasts) != 0 || target >= recording.frames) {
-        continue;
-      }
-      Mask seen = Mask::Zero(recording.height, recording.width), forecast;
-      if (const std::optional<Mask> mask = recording.mask(target, 0)) {
-        MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(*mask, seen);
-        Model future = tracker.model();
-        for (std::size_t body = 0; body < poses.size(); ++body) {
-          future.set_motion(static_cast<BodyId>(body),
-                            shifted(recording.bodies[body].motion, -start, future, static_cast<BodyId>(body)));
-        }
-        if (future.step(recording.timestamps[target] - start - future.time()).advanced()) {
-          tracker.predict(future, 0, forecast);
-          result.forecasts[k].add(overlap(forecast, seen));
-        }
-      }
+    if (frame % static_cast<std::size_t>(options.frames_between_forecasts) == 0) {
+      add_forecasts(recording, frame, start, options, follower, result);
     }
     for (const auto& contained : tracker.model().step(0).contents) {
       result.volume_ml[contained.body].push_back(1e6 * contained.volume);
     }
     progress(frame + 1);
   }
-  result.particles = tracker.model().fluid().size();
+  say_estimates(follower, initial_ml, result);
+  result.particles = tracker_of(follower).model().fluid().size();
   return result;
 }
 

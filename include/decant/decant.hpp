@@ -63,6 +63,7 @@
 #include <decant/force/concept.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
+#include <decant/force/linear_drag.hpp>
 #include <decant/force/residual_viscosity.hpp>
 #include <decant/force/step_view.hpp>
 #include <decant/force/surface_tension.hpp>
@@ -104,11 +105,15 @@
 #include <decant/simulation/simulator.hpp>
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
+#include <decant/tracking/fixed_lag_tracker.hpp>
+#include <decant/tracking/hypothesis_filter.hpp>
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/liquid_model.hpp>
 #include <decant/tracking/mask_trust.hpp>
 #include <decant/tracking/overlap.hpp>
 #include <decant/tracking/overlap_score.hpp>
+#include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
+#include <decant/tracking/value_estimate.hpp>
 #include <decant/tracking/volume_error.hpp>
 #include <decant/version.hpp>

@@ -16,60 +16,16 @@
 
 #include "catch.hpp"
 #include "correction/seen.hpp"
+#include "tracking/falling_dust.hpp"
 
 using namespace decant;
+using decant_test::FallingDust;
+using decant_test::seen;
 
 namespace {
 
-/// Somebody else's simulation: particles that fall, and one body that is not in their way.
-struct FallingDust {
-  using Scalar = double;
-  struct Body {
-    std::shared_ptr<const BoundingVolumeHierarchy> surface;
-    PoseTrack motion;
-  };
-  struct Report {
-    bool went_well = true;
-    bool advanced() const { return went_well; }
-  };
-
-  FluidState<double> dust = decant_test::liquid_block<double>({0, 0, 0});
-  std::vector<Body> scene{
-      {std::make_shared<const BoundingVolumeHierarchy>(Box{{-0.05, -0.05, -0.2}, {0.05, 0.05, -0.19}}.mesh()),
-       PoseTrack()}};
-  double now = 0;
-  double gravity = -1;  // [m/s^2]
-  bool broken = false;
-
-  FluidState<double>& fluid() { return dust; }
-  double time() const { return now; }
-  double spacing() const { return decant_test::block_spacing; }
-  const std::vector<Body>& bodies() const { return scene; }
-  void move_body(BodyId body, const Pose& pose, double duration) {
-    scene[body].motion = PoseTrack({{now, scene[body].motion.at(now)}, {now + duration, pose}});
-  }
-  Report step(double duration) {
-    if (broken) {
-      return {false};
-    }
-    now += duration;
-    dust.velocity.row(2).array() += gravity * duration;
-    dust.position += duration * dust.velocity;
-    return {};
-  }
-};
 static_assert(LiquidModel<FallingDust>);
 static_assert(LiquidModel<LiquidSimulator>);
-
-using Camera = DistortedPinholeCamera;
-
-/// What a camera before the block sees of a liquid, raw.
-template <class Scalar>
-Mask seen(const FluidState<Scalar>& fluid) {
-  decant_test::Eye<Scalar> eye(decant_test::before_the_block());
-  eye.observe(fluid);
-  return eye.observed;
-}
 
 }  // namespace
 
@@ -129,6 +85,25 @@ TEST_CASE("tracker: takes bodies to their poses and sees what they hide") {
   CHECK(report.status == FrameStatus::Ok);
   CHECK(report.prior.predicted_px == 0);
   CHECK(report.prior.observed_px > 1000);
+}
+
+TEST_CASE("tracker: a camera that moves sees from where it is") {
+  Tracker<FallingDust, OpenLoop<double>> tracker(FallingDust{});
+  tracker.model().gravity = 0;
+  tracker.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  const Mask mask = seen(tracker.model().dust);
+  const std::vector<CameraMask> masks{{0, mask}};
+  CHECK(tracker.track({0, {}, masks}).prior.iou() > 0.95);
+  // 4 cm to the right, the width of the block: 40 px at half a metre
+  Pose aside = decant_test::before_the_block();
+  aside.translation.x() -= 0.04;
+  const std::vector<CameraPose> cameras{{0, aside}};
+  CHECK(tracker.track({0.1, {}, masks, cameras}).prior.iou() < 0.1);
+  CHECK(tracker.track({0.2, {}, masks}).prior.iou() < 0.1);  // and stays there
+  const std::vector<CameraPose> no_camera{{1, aside}}, lost{{0, {Eigen::Quaterniond(0, 0, 0, 0), {0, 0, 0}}}};
+  CHECK(tracker.track({0.3, {}, masks, no_camera}).status == FrameStatus::BadInput);
+  CHECK(tracker.track({0.3, {}, masks, lost}).status == FrameStatus::BadInput);
+  CHECK(tracker.track({0.3, {}, masks}).status == FrameStatus::Ok);
 }
 
 TEST_CASE("tracker: without correction the model runs as it does alone, bit for bit") {
@@ -220,6 +195,4 @@ TEST_CASE("tracker: settings are checked") {
   settings = {};
   settings.longest_gap = 0;
   CHECK_THROWS_WITH(Plain(FallingDust{}, {}, settings), decant_test::contains("longest_gap [s] must be > 0"));
-  Plain tracker{FallingDust{}};
-  CHECK_THROWS_WITH(tracker.set_camera_pose(0, {}), decant_test::contains("camera must be one that was added"));
 }

@@ -59,12 +59,19 @@ struct CameraMask {
   ConstMaskView mask;
 };
 
-/// All that arrives with one frame. Bodies that are not named go on as they were told before; cameras that are not
-/// named saw nothing: the simulation runs on, uncorrected by them.
+/// Where a camera that moves is.
+struct CameraPose {
+  std::size_t camera = 0;
+  Pose camera_from_world{};
+};
+
+/// All that arrives with one frame. Bodies that are not named go on as they were told before; cameras without a mask
+/// saw nothing: the simulation runs on, uncorrected by them. Cameras without a pose are where they were.
 struct TrackerFrame {
   double time = 0;  ///< [s], on the model's clock
   std::span<const TrackedPose> poses{};
   std::span<const CameraMask> masks{};
+  std::span<const CameraPose> cameras{};
 };
 
 enum class FrameStatus {
@@ -154,13 +161,6 @@ class Tracker {
     return eyes_.size() - 1;
   }
 
-  /// For a camera that moves: where it is from now on.
-  void set_camera_pose(std::size_t camera, const Pose& camera_from_world) {
-    expects(camera < eyes_.size(), "Tracker: camera", "one that was added", camera);
-    expects(camera_from_world.finite(), "Tracker: camera_from_world", "finite", "NaN or infinity");
-    eyes_[camera].occlusion.set_camera_pose(camera_from_world);
-  }
-
   /// Takes the simulation to the frame's time and corrects it by the frame's masks. Never throws; a frame that is
   /// refused leaves everything as it was. A frame at the model's own time is only compared, not simulated.
   [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
@@ -192,6 +192,9 @@ class Tracker {
     }
     started_ = true;
     report.time = model_.time();
+    for (const CameraPose& pose : frame.cameras) {
+      eyes_[pose.camera].occlusion.set_camera_pose(pose.camera_from_world);
+    }
     look(frame, report);
     report.prior = compare();
     if (views_.empty()) {
@@ -227,6 +230,8 @@ class Tracker {
   /// The same before the frame's correction.
   const Mask& predicted_before(std::size_t camera) const { return eyes_.at(camera).prior; }
   const Mask& observed(std::size_t camera) const { return eyes_.at(camera).observed; }
+  /// Whether the last frame had a mask of this camera, and one that was believed.
+  bool believes(std::size_t camera) const { return eyes_.at(camera).believed; }
 
   /// The silhouette of a model's liquid in one of the cameras, with the bodies where that model has them: for
   /// forecasts, made by a copy of the model that runs ahead.
@@ -276,15 +281,21 @@ class Tracker {
   };
 
   bool usable(const TrackerFrame& frame) const noexcept {
+    const auto is_pose = [](const Pose& pose) {
+      const double norm = pose.rotation.norm();
+      return pose.finite() && norm > 0.5 && norm < 2;
+    };
     return std::all_of(frame.poses.begin(), frame.poses.end(),
                        [&](const TrackedPose& pose) {
-                         const double norm = pose.world_from_body.rotation.norm();
-                         return pose.body < model_.bodies().size() && pose.world_from_body.finite() && norm > 0.5 &&
-                                norm < 2;
+                         return pose.body < model_.bodies().size() && is_pose(pose.world_from_body);
                        }) &&
-           std::all_of(frame.masks.begin(), frame.masks.end(), [&](const CameraMask& mask) {
-             return mask.camera < eyes_.size() && mask.mask.rows() == eyes_[mask.camera].observed.rows() &&
-                    mask.mask.cols() == eyes_[mask.camera].observed.cols();
+           std::all_of(frame.masks.begin(), frame.masks.end(),
+                       [&](const CameraMask& mask) {
+                         return mask.camera < eyes_.size() && mask.mask.rows() == eyes_[mask.camera].observed.rows() &&
+                                mask.mask.cols() == eyes_[mask.camera].observed.cols();
+                       }) &&
+           std::all_of(frame.cameras.begin(), frame.cameras.end(), [&](const CameraPose& pose) {
+             return pose.camera < eyes_.size() && is_pose(pose.camera_from_world);
            });
   }
 

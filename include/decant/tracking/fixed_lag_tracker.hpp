@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A tracker that learns, while it runs, a few parameters of its model: what the corrections of the last frames have in
+/// common, so that forecasts, which nothing corrects, get better.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/tracking/silhouette_cells.hpp>
+#include <decant/tracking/tracker.hpp>
+
+namespace decant {
+
+/// Something of a model that is not known exactly. What is expected is zero, give or take a deviation.
+template <class Model>
+struct UncertainParameter {
+  std::string name;
+  double deviation = 1;                         ///< standard deviation of what is expected, in its unit; > 0
+  std::function<void(Model&, double)> apply{};  ///< makes the model have this value; must not throw
+};
+
+/// Settings of FixedLagTracker.
+struct FixedLagSettings {
+  int lag = 10;                   ///< frames, >= 2: as often parameters are adapted, and as far back
+  int cell_px = 20;               ///< see SilhouetteCells, >= 1
+  double cell_deviation = 0.5;    ///< of a cell's share of liquid, > 0: see HypothesisFilterSettings
+  double largest_residual = 0.5;  ///< a cell that is off by more counts as if by this, > 0
+  double probe = 0.7;             ///< how far parameters are moved for their effect to be seen [deviations], > 0
+  double damping = 1.2;           ///< of a step: one over the variance of a parameter's change [1/deviations^2], >= 0
+  double forgetting = 0.2;        ///< pull towards zero: one over a parameter's variance, per lag, >= 0
+  double largest_step = 1;        ///< of a parameter in one lag [deviations], > 0
+  double largest_value = 2.5;     ///< of a parameter [deviations], > 0
+  double least_gain = 1;          ///< a step is taken if it lowers the misfit by as much [nat], >= 0
+  double delay_deviation = 0.05;  ///< how late poses may be [s]; 0: they are taken as they come
+  Threads threads{};              ///< over which simulations are shared out
+};
+
+/// Every `lag` frames it goes back to the state of `lag` frames ago and runs on from there without correction: as
+/// things are, and with each parameter moved a little. What moves the predicted silhouettes of these frames towards the
+/// observed ones is a linear least-squares problem (Gauss-Newton, with the parameters' expected deviations as prior).
+/// If the solution, tried, fits better, the frames are run through once more with it, and corrected.
+/// One of the parameters is how late bodies' poses are behind the masks: then poses of the last moments are continued
+/// as they moved. It costs about (parameters + 4) simulations in place of one, and allocates.
+template <class TrackerType>
+class FixedLagTracker {
+ public:
+  using Tracker = TrackerType;
+  using Model = typename Tracker::Model;
+  using Settings = FixedLagSettings;
+  using Parameter = UncertainParameter<Model>;
+
+  /// Throws std::invalid_argument if a setting is out of range.
+  FixedLagTracker(Tracker tracker, std::vector<Parameter> parameters, const Settings& settings = {})
+      : tracker_(std::move(tracker)),
+        past_(tracker_),
+        parameters_(std::move(parameters)),
+        settings_(settings),
+        cells_(settings.cell_px) {
+    const auto positive = [](double value, const char* name) {
+      expects(value > 0 && std::isfinite(value), name, "> 0", value);
+    };
+    expects(settings.lag >= 2, "FixedLagTracker: lag [frames]", ">= 2", settings.lag);
+    positive(settings.cell_deviation, "FixedLagTracker: cell_deviation");
+    positive(settings.largest_residual, "FixedLagTracker: largest_residual");
+    positive(settings.probe, "FixedLagTracker: probe");
+    positive(settings.largest_step, "FixedLagTracker: largest_step");
+    positive(settings.largest_value, "FixedLagTracker: largest_value");
+    expects(settings.damping >= 0 && settings.forgetting >= 0 && settings.damping + settings.forgetting > 0,
+            "FixedLagTracker: damping and forgetting", ">= 0, and one of them > 0", settings.damping);
+    expects(settings.least_gain >= 0, "FixedLagTracker: least_gain [nat]", ">= 0", settings.least_gain);
+    expects(settings.delay_deviation >= 0 && settings.delay_deviation <= 1, "FixedLagTracker: delay_deviation [s]",
+            "0 .. 1", settings.delay_deviation);
+    for (const Parameter& parameter : parameters_) {
+      positive(parameter.deviation, "FixedLagTracker: deviation of a parameter");
+      expects(static_cast<bool>(parameter.apply), "FixedLagTracker: parameter '" + parameter.name + "'",
+              "one that can be applied", "no function");
+    }
+    state_.setZero(static_cast<Index>(parameters_.size()) + (settings.delay_deviation > 0 ? 1 : 0));
+  }
+
+  /// As Tracker::track; a frame with which a lag ends takes as long as all simulations of it.
+  [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
+    Seen seen{frame.time, {frame.poses.begin(), frame.poses.end()}, {}};
+    for (const CameraMask& mask : frame.masks) {
+      seen.masks.push_back({mask.camera, Mask(mask.mask)});
+    }
+    seen_.push_back(std::move(seen));
+    const FrameReport report = show(tracker_, seen_.back(), state_, true);
+    if (!report.advanced()) {
+      seen_.pop_back();
+      return report;
+    }
+    seen_.back().believed = report.status == FrameStatus::Ok;
+    if (static_cast<int>(seen_.size()) - first_ == settings_.lag) {
+      adapt();
+      past_ = tracker_;
+      // of what is past only poses are still asked for, of delayed bodies
+      first_ = static_cast<int>(seen_.size());
+      for (Seen& each : seen_) {
+        each.masks.clear();
+      }
+      const int kept = most_delay_frames;
+      if (first_ > kept) {
+        seen_.erase(seen_.begin(), seen_.begin() + (first_ - kept));
+        first_ = kept;
+      }
+    }
+    return report;
+  }
+
+  Tracker& tracker() noexcept { return tracker_; }
+  const std::vector<Parameter>& parameters() const noexcept { return parameters_; }
+  /// Of a parameter, as estimated, in its unit.
+  double value(std::size_t parameter) const {
+    return state_[static_cast<Index>(parameter)] * parameters_.at(parameter).deviation;
+  }
+  /// How late poses are behind the masks, as estimated [s]. Negative: early.
+  double pose_delay() const noexcept { return delay(state_); }
+
+ private:
+  struct SeenMask {
+    std::size_t camera;
+    Mask mask;
+  };
+  struct Seen {
+    double time;
+    std::vector<TrackedPose> poses;
+    std::vector<SeenMask> masks;
+    bool believed = false;
+  };
+  static constexpr int most_delay_frames = 15, frames_for_speed = 6;
+
+  double delay(const Eigen::VectorXd& state) const noexcept {
+    return settings_.delay_deviation > 0 ? state[state.size() - 1] * settings_.delay_deviation : 0;
+  }
+
+  /// Where a body is, seen or continued from how it moved last.
+  Pose pose_at(BodyId body, double time) const noexcept {
+    const auto find = [&](const Seen& seen) {
+      return std::find_if(seen.poses.begin(), seen.poses.end(),
+                          [&](const TrackedPose& pose) { return pose.body == body; });
+    };
+    std::vector<PoseTrack::Sample> samples;
+    for (const Seen& seen : seen_) {
+      if (const auto pose = find(seen); pose != seen.poses.end()) {
+        samples.push_back({seen.time, pose->world_from_body});
+      }
+    }
+    const PoseTrack::Sample& last = samples.back();
+    if (time <= last.time || samples.size() < 2) {
+      return PoseTrack(std::move(samples)).at(time);
+    }
+    const PoseTrack::Sample& before =
+        samples[samples.size() - std::min<std::size_t>(samples.size(), frames_for_speed + 1)];
+    const double ahead = (time - last.time) / (last.time - before.time);
+    const RigidVelocity moved = velocity_between(before.pose, last.pose, 1);
+    const double angle = ahead * moved.angular.norm();
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(angle, angle > 0 ? moved.angular.normalized() : Vector3<double>::UnitX()));
+    return {turn * last.pose.rotation, last.pose.translation + ahead * moved.linear};
+  }
+
+  FrameReport show(Tracker& tracker, const Seen& seen, const Eigen::VectorXd& state, bool correcting) const noexcept {
+    for (std::size_t k = 0; k < parameters_.size(); ++k) {
+      parameters_[k].apply(tracker.model(), state[static_cast<Index>(k)] * parameters_[k].deviation);
+    }
+    std::vector<TrackedPose> poses = seen.poses;
+    if (const double late = delay(state); late != 0) {
+      for (TrackedPose& pose : poses) {
+        pose.world_from_body = pose_at(pose.body, seen.time + late);
+      }
+    }
+    std::vector<CameraMask> masks;
+    for (const SeenMask& mask : seen.masks) {
+      if (correcting) {
+        masks.push_back({mask.camera, mask.mask});
+      }
+    }
+    return tracker.track({seen.time, poses, masks});
+  }
+
+  /// Differences of shares of liquid, observed minus predicted, of all frames since the past state, uncorrected.
+  Eigen::VectorXd residual(const Eigen::VectorXd& state) const noexcept {
+    Tracker tracker = past_;
+    std::vector<double> all;
+    for (std::size_t k = static_cast<std::size_t>(first_); k < seen_.size(); ++k) {
+      if (!show(tracker, seen_[k], state, false).advanced()) {
+        return {};
+      }
+      for (std::size_t m = 0; seen_[k].believed && m < seen_[k].masks.size(); ++m) {
+        const SilhouetteCells::Shares& seen = observed_[k - static_cast<std::size_t>(first_)][m];
+        const SilhouetteCells::Shares off = seen - blurred(cells_.shares(tracker.predicted(seen_[k].masks[m].camera)));
+        all.insert(all.end(), off.data(), off.data() + off.size());
+      }
+    }
+    return Eigen::Map<Eigen::VectorXd>(all.data(), static_cast<Index>(all.size()));
+  }
+
+  /// With (1 2 1) / 4 along both sides, so that what is off by a cell is still seen to be near.
+  static SilhouetteCells::Shares blurred(const SilhouetteCells::Shares& shares) {
+    const Index rows = shares.rows(), columns = shares.cols();
+    SilhouetteCells::Shares across = shares, both;
+    for (Index c = 0; c < columns; ++c) {
+      across.col(c) = 0.25 * (shares.col(std::max<Index>(c - 1, 0)) + shares.col(std::min(c + 1, columns - 1))) +
+                      0.5 * shares.col(c);
+    }
+    both = across;
+    for (Index r = 0; r < rows; ++r) {
+      both.row(r) =
+          0.25 * (across.row(std::max<Index>(r - 1, 0)) + across.row(std::min(r + 1, rows - 1))) + 0.5 * across.row(r);
+    }
+    return both;
+  }
+
+  double misfit(const Eigen::VectorXd& residual, const Eigen::VectorXd& state) const noexcept {
+    const double limit = settings_.largest_residual, variance = settings_.cell_deviation * settings_.cell_deviation;
+    return 0.5 * residual.cwiseMax(-limit).cwiseMin(limit).squaredNorm() / variance +
+           0.5 * settings_.forgetting * state.squaredNorm();
+  }
+
+  void adapt() noexcept {
+    if (state_.size() == 0 || !std::any_of(seen_.begin() + first_, seen_.end(),
+                                           [](const Seen& seen) { return seen.believed && !seen.masks.empty(); })) {
+      return;
+    }
+    observed_.assign(seen_.size() - static_cast<std::size_t>(first_), {});
+    Mask cleaned;
+    MaskCleaning cleaning(tracker_.settings().cleaning_window_px, tracker_.settings().smallest_region_px);
+    for (std::size_t k = 0; k < observed_.size(); ++k) {
+      for (const SeenMask& mask : seen_[k + static_cast<std::size_t>(first_)].masks) {
+        cleaned.resize(mask.mask.rows(), mask.mask.cols());
+        cleaning.apply(mask.mask, cleaned);
+        observed_[k].push_back(blurred(cells_.shares(cleaned)));
+      }
+    }
+    const Index count = state_.size();
+    std::vector<Eigen::VectorXd> outcome(static_cast<std::size_t>(count + 1));
+    parallel_ranges(count + 1, settings_.threads, 1, [&](Index k, Index) {
+      Eigen::VectorXd probe = state_;
+      if (k > 0) {
+        // towards the inside, so that a probe is never beyond what a parameter may be
+        probe[k - 1] += probe[k - 1] > 0 ? -settings_.probe : settings_.probe;
+      }
+      outcome[static_cast<std::size_t>(k)] = residual(probe);
+    });
+    const Eigen::VectorXd& now = outcome[0];
+    if (now.size() == 0) {
+      return;
+    }
+    Eigen::MatrixXd effect = Eigen::MatrixXd::Zero(now.size(), count);
+    for (Index k = 0; k < count; ++k) {
+      const Eigen::VectorXd& moved = outcome[static_cast<std::size_t>(k + 1)];
+      if (moved.size() == now.size()) {
+        effect.col(k) = (now - moved) / (state_[k] > 0 ? -settings_.probe : settings_.probe);
+      }
+    }
+    const double limit = settings_.largest_residual, variance = settings_.cell_deviation * settings_.cell_deviation;
+    Eigen::MatrixXd normal = effect.transpose() * effect / variance;
+    normal.diagonal().array() += settings_.damping + settings_.forgetting;
+    const Eigen::VectorXd downhill =
+        effect.transpose() * now.cwiseMax(-limit).cwiseMin(limit) / variance - settings_.forgetting * state_;
+    const Eigen::VectorXd step = normal.ldlt().solve(downhill);
+    if (!step.allFinite()) {
+      return;
+    }
+    const Eigen::VectorXd trial = (state_ + step.cwiseMax(-settings_.largest_step).cwiseMin(settings_.largest_step))
+                                      .cwiseMax(-settings_.largest_value)
+                                      .cwiseMin(settings_.largest_value);
+    const Eigen::VectorXd tried = residual(trial);
+    if (tried.size() != now.size() || !(misfit(tried, trial) < misfit(now, state_) - settings_.least_gain)) {
+      return;
+    }
+    Tracker again = past_;
+    for (std::size_t k = static_cast<std::size_t>(first_); k < seen_.size(); ++k) {
+      if (!show(again, seen_[k], trial, true).advanced()) {
+        return;
+      }
+    }
+    tracker_ = std::move(again);
+    state_ = trial;
+  }
+
+  Tracker tracker_, past_;  ///< past_: as it was before seen_[first_]
+  std::vector<Parameter> parameters_;
+  Settings settings_;
+  SilhouetteCells cells_;
+  Eigen::VectorXd state_{};  ///< parameters in deviations, then the delay if it is one of them
+  std::vector<Seen> seen_{};
+  int first_ = 0;  ///< of seen_, what came after past_
+  std::vector<std::vector<SilhouetteCells::Shares>> observed_{};
+};
+
+}  // namespace decant

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <decant/tracking/value_estimate.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+TEST_CASE("value estimate: a normal density, known at values a deviation apart") {
+  for (const double center : {10.0, 10.2, 10.5, 10.77}) {
+    std::vector<double> values, log_density;
+    for (int k = 0; k <= 20; ++k) {
+      values.push_back(k);
+      log_density.push_back(500 - 0.5 * (k - center) * (k - center));  // any constant will do
+    }
+    INFO(center);
+    const ValueEstimate estimate = estimate_value(values, log_density, 0.9);
+    CHECK(estimate.mean == Approx(center).margin(0.01));
+    CHECK(estimate.low == Approx(center - 1.6449).margin(0.01));  // of the normal distribution
+    CHECK(estimate.high == Approx(center + 1.6449).margin(0.01));
+    CHECK_FALSE(estimate.at_end);
+  }
+}
+
+TEST_CASE("value estimate: even density between uneven values, and what lies at an end") {
+  const std::vector<double> values{1, 2, 5}, even{3, 3, 3}, rising{-100, -50, 0};
+  const ValueEstimate flat = estimate_value(values, even, 0.5);
+  CHECK(flat.mean == Approx(3).margin(0.02));
+  CHECK(flat.low == Approx(2).margin(0.02));
+  CHECK(flat.high == Approx(4).margin(0.02));
+  CHECK(estimate_value(values, even, 0.9).at_end);
+  const ValueEstimate beyond = estimate_value(values, rising);
+  CHECK(beyond.at_end);
+  CHECK(beyond.low > 4.5);
+  const std::vector<double> one{7}, any{-3};
+  CHECK(estimate_value(one, any).mean == 7);
+  CHECK(estimate_value(one, any).at_end);
+}
+
+TEST_CASE("value estimate: a value beside others that are impossible stays within half a gap, evenly") {
+  const double never = -std::numeric_limits<double>::infinity();
+  const std::vector<double> values{1, 2, 3, 4, 5}, log_density{never, never, 0, never, never};
+  const ValueEstimate estimate = estimate_value(values, log_density);
+  CHECK(estimate.mean == Approx(3).margin(1e-9));
+  CHECK(estimate.low > 2.5);
+  CHECK(estimate.high < 3.5);
+  CHECK_FALSE(estimate.at_end);
+  // two that are as probable, and one impossible next to them: nothing beyond the two
+  const std::vector<double> two{never, -1, 0, -2, never};
+  CHECK(estimate_value(values, two).low > 1.5);
+  CHECK(estimate_value(values, two).high < 4.5);
+}
+
+TEST_CASE("value estimate: refuses what is no density") {
+  const std::vector<double> values{1, 2}, falling{2, 1}, numbers{0, 0}, one{0}, none{};
+  const std::vector<double> nowhere(2, -std::numeric_limits<double>::infinity()), broken{0, std::nan("")};
+  CHECK_THROWS_WITH(estimate_value(none, none), decant_test::contains("at least 1"));
+  CHECK_THROWS_WITH(estimate_value(values, one), decant_test::contains("that of values"));
+  CHECK_THROWS_WITH(estimate_value(falling, numbers), decant_test::contains("increasing"));
+  CHECK_THROWS_WITH(estimate_value(values, nowhere), decant_test::contains("must be finite"));
+  CHECK_THROWS_WITH(estimate_value(values, broken), decant_test::contains("a number"));
+  CHECK_THROWS_WITH(estimate_value(values, numbers, 1), decant_test::contains("in (0, 1)"));
+}
