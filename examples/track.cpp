@@ -34,8 +34,11 @@ int main(int count, char** values) {
   bool without_forecasts = false;
   CLI::App app("Keeps a simulation in step with the masks of a recording, by one or more methods.");
   app.add_option("recording", folder, "folder of a recording, format version 1")->required();
-  app.add_option("--corrector", names,
-                 "open_loop, map_filter, warp_field (both as printed), transport, default; several by commas")
+  app.add_option(
+         "--corrector", names,
+         "open_loop, map_filter, warp_field (both as printed), map_filter_mended, transport, default; default_adapting "
+         "(of several parameters) and default_amounts (of the initial amount) take several simulations; several by "
+         "commas")
       ->delimiter(',')
       ->check(CLI::IsMember(example::tracking_method_names()));
   app.add_option("--json", json_file, "writes the scores");

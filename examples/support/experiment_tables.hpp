@@ -324,25 +324,34 @@ inline std::vector<ExperimentSection> harmless_tables(const TrackingExperiment& 
 inline std::vector<ExperimentSection> amount_tables(const TrackingExperiment& experiment,
                                                     const std::vector<Pour>& pours,
                                                     const std::vector<std::string>& methods) {
-  const std::vector<std::string> columns{"told",   "method",    "true at start", "at start",    "true at end",
-                                         "at end", "true, pan", "pan",           "assimilated", "prior"};
+  const std::vector<std::string> columns{"told",      "method", "true at start", "at start", "true at end", "at end",
+                                         "true, pan", "pan",    "assimilated",   "prior",    "from",        "to"};
   std::vector<std::string> header{"recording"};
   header.insert(header.end(), columns.begin(), columns.end());
   ExperimentSection section{"A wrong amount at the start",
                             decant::Table(header),
-                            {{{"", 3}, {"all containers [ml]", 4}, {"at the end [ml]", 2}, {"IoU, truth [%]", 2}}, {}},
+                            {{{"", 3},
+                              {"all containers [ml]", 4},
+                              {"at the end [ml]", 2},
+                              {"IoU, truth [%]", 2},
+                              {"90 % of the initial amount [ml]", 2}},
+                             {}},
                             "Liquid in the containers, as it was and as the method has it; scores are against "
-                            "silhouettes without noise."};
-  ExperimentSection errors{"Errors of the amount",
-                           decant::Table({"told", "method", "at start", "at end", "pan at end"}),
-                           {},
-                           "Means over recordings of amount less true amount, in percent of the true amount in all "
-                           "containers."};
+                            "silhouettes without noise. Methods that estimate the initial amount say between which two "
+                            "amounts it is with a probability of 90 %."};
+  ExperimentSection errors{
+      "Errors of the amount",
+      decant::Table({"told", "method", "at start", "at end", "worst at end", "pan at end", "interval holds truth"}),
+      {},
+      "Means over recordings of amount less true amount, in percent of the true amount in all "
+      "containers; worst: the one farthest from zero. Last: in how many recordings the interval of "
+      "the initial amount has the true one in it."};
   const Condition& condition = amount_condition();
   for (const double factor : condition.values) {
     const std::string told = detail::figure(100 * factor, 0) + " %";
     for (const std::string& method : methods) {
       std::vector<double> at_start, at_end, in_pan;
+      int intervals = 0, held = 0;
       for (const Pour& each : pours) {
         const nlohmann::json& result = experiment.result({each, method, &condition, factor});
         const auto volume = [&](const char* kind, const char* body, bool end) {
@@ -355,7 +364,9 @@ inline std::vector<ExperimentSection> amount_tables(const TrackingExperiment& ex
                                          volume("true_volume_ml", "pan", true),
                                          volume("volume_ml", "pan", true),
                                          100 * detail::number_at(result, "/truth_iou_mean"),
-                                         100 * detail::number_at(result, "/truth_prior_iou")};
+                                         100 * detail::number_at(result, "/truth_prior_iou"),
+                                         detail::number_at(result, "/initial_ml/low_90"),
+                                         detail::number_at(result, "/initial_ml/high_90")};
         std::vector<std::string> cells{each.name, told, method};
         nlohmann::json& json = section.json[each.name][method][decant::detail::number_text(factor)];
         for (std::size_t k = 0; k < values.size(); ++k) {
@@ -366,11 +377,19 @@ inline std::vector<ExperimentSection> amount_tables(const TrackingExperiment& ex
         at_start.push_back(100 * (values[1] - values[0]) / values[0]);
         at_end.push_back(100 * (values[3] - values[2]) / values[2]);
         in_pan.push_back(100 * (values[5] - values[4]) / values[2]);
+        const double low = values[8], high = values[9], initial = detail::number_at(result, "/true_initial_ml");
+        intervals += std::isfinite(low) ? 1 : 0;
+        held += low <= initial && initial <= high ? 1 : 0;
       }
       const double start = detail::mean_of(at_start), end = detail::mean_of(at_end), pan = detail::mean_of(in_pan);
-      errors.table.add({told, method, detail::figure(start, 1), detail::figure(end, 1), detail::figure(pan, 1)});
+      const double worst =
+          *std::max_element(at_end.begin(), at_end.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+      errors.table.add({told, method, detail::figure(start, 1), detail::figure(end, 1), detail::figure(worst, 1),
+                        detail::figure(pan, 1),
+                        intervals > 0 ? std::to_string(held) + " of " + std::to_string(intervals) : "-"});
       errors.json[method][decant::detail::number_text(factor)] = {
-          {"at_start", number_json(start)}, {"at_end", number_json(end)}, {"pan_at_end", number_json(pan)}};
+          {"at_start", number_json(start)}, {"at_end", number_json(end)}, {"worst_at_end", number_json(worst)},
+          {"pan_at_end", number_json(pan)}, {"intervals", intervals},     {"intervals_with_truth", held}};
     }
   }
   return {std::move(errors), std::move(section)};

@@ -91,23 +91,23 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   for (int k = 0; k < 2; ++k) {
     switch (kinds[static_cast<std::size_t>(k)]) {
       case 0: {
-        const double size = between(0.7, 1.1);
+        const double size = between(0.4, 0.8);
         const double angle = between(0, 2 * std::numbers::pi);
         hidden.pull = {size * std::cos(angle), size * std::sin(angle), 0};
         break;
       }
       case 1:
-        hidden.drag = between(1, 2);
+        hidden.drag = between(0.5, 1);
         break;
       case 2:  // what a boundary layer does that is thinner than a particle
         hidden.sticky_walls = true;
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 1e-4);
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, 5e-5);
         break;
       case 3:
-        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.0, -3.4)));
+        hidden.kinematic_viscosity = std::max(hidden.kinematic_viscosity, std::pow(10.0, between(-4.3, -3.7)));
         break;
       case 4:
-        hidden.latency = between(0.06, 0.1);
+        hidden.latency = between(0.04, 0.07);
         break;
       default:
         break;
@@ -206,7 +206,7 @@ inline decant::PoseTrack pour_motion(const PourTwin& twin, const decant::Vector3
 /// The camera, 640 x 480: from the side the liquid does not come from, a little above, looking at the pan and the jet.
 inline decant::PinholeCamera pour_camera() { return {600, 600, 319.5, 239.5, 640, 480}; }
 inline decant::Pose pour_camera_from_world() {
-  const decant::Vector3<double> eye(0.28, -0.58, 0.40), target(0.0, 0, 0.06);
+  const decant::Vector3<double> eye(0.21, -0.44, 0.32), target(0.0, 0, 0.09);
   const decant::Vector3<double> ahead = (target - eye).normalized();
   const decant::Vector3<double> right = ahead.cross(decant::Vector3<double>::UnitZ()).normalized();
   decant::Matrix3<double> camera_axes;

@@ -37,7 +37,7 @@ namespace example {
 struct TrackingOptions {
   double spacing = 0.005;           ///< of the model's particles [m]
   std::vector<double> forecasts{};  ///< how far ahead [s]
-  int frames_between_forecasts = 5;
+  int frames_between_forecasts = 10;
   int threads = 0;
   bool keep_overlays = false;        ///< for reports; takes some MB of memory per hundred frames
   double initial_amount_factor = 1;  ///< the model starts with so much of what the recording says, >= 0

@@ -27,8 +27,11 @@ namespace decant {
 /// far, and no more (the paper applies C_i of either sign or of positive sign only). Pair moves are mutual, so momentum
 /// is kept to rounding. Neighbours are those of the start, found a little beyond the support; walls enter linearised,
 /// phi(x*) = phi(x) + grad phi . (x* - x) - dt flux, and mirror lambda as they mirror pressure in PressureSystem.
-/// An error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy. Not for larger steps either:
-/// beyond largest_step water in a cup throws itself out.
+/// Differs from the paper in what becomes speed: all of what the sub-step would compress, but only a share of what was
+/// too dense before it, C_i <= (1 - recovery) max(0, C_i(x)), as Baumgarte 1972 stabilizes constraints. Sweeps leave
+/// some compression over, and undone within one short sub-step a per cent of it is as fast as a jet: with the paper's
+/// recovery of 1, water at rest in a cup of 22 layers (a mesh) has 1.2 m/s after a second, with 0.3 half a centimetre.
+/// An error and a stiffness that depend on the number of sweeps: take Dfsph for accuracy.
 template <class ScalarType>
 class PositionBased {
  public:
@@ -36,10 +39,12 @@ class PositionBased {
   static constexpr double search_margin = 0.1;
 
   int most_iterations = 12;                 ///< sweeps per sub-step, >= 1
-  Scalar density_tolerance = Scalar(1e-3);  ///< mean compression over the liquid that ends the sweeps [-]
+  Scalar density_tolerance = Scalar(1e-3);  ///< mean compression beyond the constraints that ends the sweeps [-]
   /// omega [-], 0 < omega <= 1. All particles move at once, each as if the others stood still; at more than about a
   /// half they overshoot together.
   Scalar relaxation = Scalar(0.5);
+  /// Share of the compression before the sub-step that is undone in it, and becomes speed [-], 0 < recovery <= 1.
+  Scalar recovery = Scalar(0.3);
   /// epsilon over the denominator of a full neighbourhood [-], >= 0: softens particles with few neighbours.
   Scalar softness = Scalar(0.01);
 
@@ -74,6 +79,7 @@ class PositionBased {
     records_.resize(4 * static_cast<std::size_t>(count));
     factor_.resize(static_cast<std::size_t>(count));
     total_.resize(static_cast<std::size_t>(count));
+    allowed_.resize(static_cast<std::size_t>(count));
     parallel_for(count, step.threads, [&](Index i) {
       Scalar* record = &records_[static_cast<std::size_t>(4 * i)];
       for (Index axis = 0; axis < 3; ++axis) {
@@ -81,22 +87,24 @@ class PositionBased {
       }
       record[3] = step.fluid.mass[i];
       total_[static_cast<std::size_t>(i)] = 0;
+      allowed_[static_cast<std::size_t>(i)] =
+          (1 - recovery) * std::max(step.fluid.density[i] / step.rest_density - 1, Scalar(0));
     });
     // Denominator of a lattice without walls, about: m / rho_0 is d^3, and |grad C|^2 adds up to some 1 / d^2.
     const Scalar floor = std::max(softness, Scalar(1e-6)) / (step.spacing * step.spacing);
-    double error = 0;
+    Compression left;
     int iterations = 0;
     for (;;) {
-      error = find_factors(step, floor);
-      if (error <= static_cast<double>(density_tolerance) || iterations == most_iterations) {
-        break;  // the error belongs to the positions as they are: the factors are not used
+      left = find_factors(step, floor);
+      if (left.beyond <= static_cast<double>(density_tolerance) || iterations == most_iterations) {
+        break;  // what is left belongs to the positions as they are: the factors are not used
       }
       move(step);
       ++iterations;
     }
     report.density_iterations += iterations;
-    report.density_error = std::max(report.density_error, error);
-    report.converged = report.converged && error <= static_cast<double>(density_tolerance);
+    report.density_error = std::max(report.density_error, left.all);
+    report.converged = report.converged && left.beyond <= static_cast<double>(density_tolerance);
     parallel_for(count, step.threads, [&](Index i) {
       const Scalar* record = &records_[static_cast<std::size_t>(4 * i)];
       step.fluid.velocity.col(i) = Vector3<Scalar>(record[0], record[1], record[2]) / dt;
@@ -140,17 +148,22 @@ class PositionBased {
     return result;
   }
 
-  /// lambda of every particle; returns the mean compression.
+  /// Means over the liquid [-].
+  struct Compression {
+    double all = 0, beyond = 0;  ///< beyond what is allowed
+  };
+
+  /// lambda of every particle; returns how compressed the liquid is before it acts.
   template <class Step>
-  double find_factors(const Step& step, Scalar floor) noexcept {
+  Compression find_factors(const Step& step, Scalar floor) noexcept {
     using Kernel = typename Step::Kernel;
     const Index count = step.fluid.size();
     const Scalar h = step.smoothing_length;
     const Scalar rho = step.rest_density;
-    const double compression = reduction_.over(
-        count, step.threads, 0.0,
+    const Compression total = reduction_.over(
+        count, step.threads, Compression{},
         [&](Index begin, Index end) {
-          double partial = 0;
+          Compression partial;
           for (Index i = begin; i < end; ++i) {
             const auto own = static_cast<std::size_t>(i);
             const Scalar* record = &records_[4 * own];
@@ -170,17 +183,21 @@ class PositionBased {
                                     wall[2] * record[2] - step.time_step * step.walls.flux[i];
             const Scalar share = std::max(fraction, Scalar(0));
             const Scalar excess = (sum(density) + record[3] * Kernel::value(Scalar(0), h)) / rho + share - 1;
-            partial += static_cast<double>(std::max(excess, Scalar(0)));
+            const Scalar beyond = excess - allowed_[own];
+            partial.all += static_cast<double>(std::max(excess, Scalar(0)));
+            partial.beyond += static_cast<double>(std::max(beyond, Scalar(0)));
             const Vector3<Scalar> pairs = Vector3<Scalar>(sum(x), sum(y), sum(z)) / rho;
             const Scalar response = std::max(sum(squares) / (rho * rho) + (pairs + wall).squaredNorm(), Scalar(0));
             // constraints only push; total_ holds what was pushed so far and may be taken back, but not beyond
-            const Scalar wanted = -relaxation * excess / (response + floor);
+            const Scalar wanted = -relaxation * beyond / (response + floor);
             factor_[own] = std::min(wanted, -total_[own]);
           }
           return partial;
         },
-        [](double a, double b) { return a + b; });
-    return compression / static_cast<double>(count);
+        [](const Compression& a, const Compression& b) {
+          return Compression{a.all + b.all, a.beyond + b.beyond};
+        });
+    return {total.all / static_cast<double>(count), total.beyond / static_cast<double>(count)};
   }
 
   template <class Step>
@@ -218,7 +235,8 @@ class PositionBased {
   std::vector<Scalar> records_{}, next_{};  ///< move since the start of the sub-step [m], mass
   std::vector<Scalar> factor_{};            ///< lambda of this sweep [m^2]
   std::vector<Scalar> total_{};             ///< of all sweeps
-  Reduction<double> reduction_{};
+  std::vector<Scalar> allowed_{};           ///< compression that is left as it is [-]
+  Reduction<Compression> reduction_{};
 };
 
 }  // namespace decant

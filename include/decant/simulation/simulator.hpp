@@ -286,6 +286,7 @@ class Simulator {
       kept_velocity_ = fluid_.velocity;
       fluid_.velocity.setZero();
       apart_.most_iterations = sweeps;
+      apart_.recovery = 1;
       PressureReport report;
       apart_.solve(view(1), report);
       before_ = fluid_.position;
