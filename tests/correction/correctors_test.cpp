@@ -120,11 +120,13 @@ TEST_CASE("transport corrector: what is hidden stays") {
 
 TEST_CASE("correctors: the same bits for any number of threads") {
   const auto require_same = [](auto make) {
+    constexpr int deep = 32;
+    static_assert(64 * deep >= 4 * decant::least_per_thread);  // else some threads have no work
     Eye<float> eye(decant_test::before_the_block());
-    eye.observe(liquid_block<float>({0.01, 0, 0.004}));
+    eye.observe(liquid_block<float>({0.01, 0, 0.004}, deep));
     decant::FluidState<float> first;
     for (int threads : {1, 2, 4}) {
-      auto fluid = liquid_block<float>({0, 0, 0});
+      auto fluid = liquid_block<float>({0, 0, 0}, deep);
       auto corrector = make();
       correct(corrector, fluid, std::array{&eye}, {threads});
       if (threads == 1) {
@@ -133,7 +135,7 @@ TEST_CASE("correctors: the same bits for any number of threads") {
       REQUIRE(fluid.position == first.position);
       REQUIRE(fluid.velocity == first.velocity);
     }
-    const auto untouched = liquid_block<float>({0, 0, 0});
+    const auto untouched = liquid_block<float>({0, 0, 0}, deep);
     REQUIRE((first.position != untouched.position || first.velocity != untouched.velocity));
   };
   require_same([] { return decant::TransportCorrector<>(); });

@@ -16,14 +16,15 @@ namespace decant_test {
 
 inline constexpr double block_spacing = 0.005;
 
-/// 8 x 8 x 8 particles around `center` [m], at rest.
+/// 8 x `deep` x 8 particles around `center` [m], at rest.
 template <class Scalar>
-decant::FluidState<Scalar> liquid_block(const decant::Vector3<double>& center) {
+decant::FluidState<Scalar> liquid_block(const decant::Vector3<double>& center, int deep = 8) {
   decant::FluidState<Scalar> fluid;
-  fluid.resize(512);
-  for (decant::Index i = 0; i < 512; ++i) {
-    const decant::Vector3<double> place(static_cast<double>(i % 8) - 3.5, static_cast<double>(i / 8 % 8) - 3.5,
-                                        static_cast<double>(i / 64) - 3.5);
+  fluid.resize(64 * deep);
+  for (decant::Index i = 0; i < fluid.size(); ++i) {
+    const decant::Vector3<double> place(static_cast<double>(i % 8) - 3.5,
+                                        static_cast<double>(i / 8 % deep) - 0.5 * (deep - 1),
+                                        static_cast<double>(i / (8 * deep)) - 3.5);
     fluid.position.col(i) = (center + block_spacing * place).template cast<Scalar>();
     fluid.id[i] = static_cast<std::uint32_t>(i);
     fluid.mass[i] = Scalar(1e-4);

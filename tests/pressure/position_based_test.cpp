@@ -20,8 +20,8 @@ using namespace decant::testing;
 namespace {
 
 template <class Scalar>
-auto ball(double scale, double disorder, double speed) {
-  auto liquid = loose_ball<CubicSpline<Scalar>>(Scalar(0.005), 5, disorder, speed);
+auto ball(double scale, double disorder, double speed, int radius = 5) {
+  auto liquid = loose_ball<CubicSpline<Scalar>>(Scalar(0.005), radius, disorder, speed);
   const PointArray<Scalar> velocity = liquid.fluid.velocity;
   liquid.place(static_cast<Scalar>(scale) * liquid.fluid.position);
   liquid.fluid.velocity = velocity;
@@ -93,7 +93,7 @@ TEMPLATE_TEST_CASE("PositionBased makes speed of a share of what was too dense b
 }
 
 TEMPLATE_TEST_CASE("PositionBased keeps momentum and does not know the number of threads", "", float, double) {
-  auto liquid = ball<TestType>(0.98, 0.1, 0.1);
+  auto liquid = ball<TestType>(0.98, 0.1, 0.1, radius_for_four_threads);
   const PointArray<TestType> before = liquid.fluid.velocity;
   PositionBased<TestType> solver;
   solve(solver, liquid);

@@ -126,6 +126,10 @@ LooseLiquid<Kernel> loose_ball(typename Kernel::Scalar spacing, int radius_in_sp
   return liquid;
 }
 
+/// The radius [spacings] of a ball that is large enough to be shared among four threads.
+inline constexpr int radius_for_four_threads = 8;
+static_assert(4 * radius_for_four_threads * radius_for_four_threads * radius_for_four_threads >= 4 * least_per_thread);
+
 /// Which of the momenta a force claims to keep.
 enum class Keeps { Neither, Linear, LinearAndAngular };
 
@@ -137,22 +141,24 @@ std::vector<Law> force_laws(Force force, Keeps keeps) {
   const double rounding = static_cast<double>(std::numeric_limits<Scalar>::epsilon());
   LooseLiquid<Kernel> liquid = loose_ball<Kernel>(Scalar(0.005), 5, 0.2, 0.1);
   const Index count = liquid.fluid.size();
-  const auto accelerations = [&](int threads) {
-    PointArray<Scalar> result = PointArray<Scalar>::Zero(3, count);
-    liquid.threads = {threads};
-    force.accumulate(liquid.view(), result);
+  const auto accelerations = [&force](LooseLiquid<Kernel>& of, int threads) {
+    PointArray<Scalar> result = PointArray<Scalar>::Zero(3, of.fluid.size());
+    of.threads = {threads};
+    force.accumulate(of.view(), result);
     return result;
   };
-  const PointArray<Scalar> alone = accelerations(1);
+  const PointArray<Scalar> alone = accelerations(liquid, 1);
   const double largest = static_cast<double>(alone.cwiseAbs().maxCoeff());
 
   PointArray<Scalar> onto = PointArray<Scalar>::Constant(3, count, Scalar(3));
   force.accumulate(liquid.view(), onto);
   const double added = static_cast<double>((onto - alone).array().operator-(Scalar(3)).abs().maxCoeff());
 
+  LooseLiquid<Kernel> shared_out = loose_ball<Kernel>(Scalar(0.005), radius_for_four_threads, 0.2, 0.1);
+  const PointArray<Scalar> by_one = accelerations(shared_out, 1);
   double threads_differ = 0;
   for (const int threads : {1, 2, 4}) {
-    threads_differ += accelerations(threads) == alone ? 0 : 1;
+    threads_differ += accelerations(shared_out, threads) == by_one ? 0 : 1;
   }
 
   Vector3<double> momentum = Vector3<double>::Zero(), angular = Vector3<double>::Zero();
