@@ -251,7 +251,7 @@ void add_forecasts(const decant::Recording& recording, std::size_t frame, double
   for (const std::size_t k : nearest_first) {
     const auto target = static_cast<std::size_t>(
         std::lround(static_cast<double>(frame) + options.forecasts[k] * recording.frames_per_second));
-    const std::optional<Mask> mask = target < recording.frames ? recording.mask(target, 0) : std::nullopt;
+    const std::optional<Mask> mask = target < recording.frames ? recording.liquid_mask(target, 0) : std::nullopt;
     if (!mask) {
       continue;
     }
@@ -306,7 +306,7 @@ TrackingResult track_recording(
     for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
       cameras.push_back({camera, recording.cameras[camera].view(frame).camera_from_world});
       if (std::optional<Mask> mask =
-              options.masks ? options.masks(recording, frame, camera) : recording.mask(frame, camera)) {
+              options.masks ? options.masks(recording, frame, camera) : recording.liquid_mask(frame, camera)) {
         kept.push_back(std::move(*mask));
         masks.push_back({camera, kept.back()});
       }

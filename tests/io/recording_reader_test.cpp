@@ -91,6 +91,19 @@ TEST_CASE("recording reader: everything arrives in SI units") {
   CHECK(recording.thermal_imager->image_from_thermal(1, 0) == -0.01);
 }
 
+TEST_CASE("recording reader: a frame without a mask is labelled by its thermal image") {
+  const RecordingFolder folder("recording_thermal_label");
+  const decant::Recording recording = decant::read_recording(folder.path());
+  CHECK((*recording.liquid_mask(0) == RecordingFolder::mask(0)).all());  // what is labelled already stays
+  CHECK_FALSE(recording.liquid_mask(2).has_value());
+  CHECK((*recording.liquid_mask(2, 1) == RecordingFolder::mask(2)).all());
+  std::filesystem::remove(folder.path() / "mask_liquid/000000.png");
+  // one warm pixel, at column 6.28 and row 4.66 of the image, and those to which it lends half of its warmth or more
+  decant::Mask warm = decant::Mask::Zero(6, 8);
+  warm(5, 6) = warm(5, 7) = warm(4, 7) = 255;
+  CHECK((*recording.liquid_mask(0) == warm).all());
+}
+
 TEST_CASE("recording reader: cameras, fixed and moving") {
   using namespace decant;
   const RecordingFolder folder("recording_cameras");

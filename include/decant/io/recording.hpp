@@ -16,6 +16,8 @@
 #include <Eigen/Core>
 
 #include <decant/boundary/triangle_mesh.hpp>
+#include <decant/camera/affine_map.hpp>
+#include <decant/camera/thermal_label.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pose.hpp>
@@ -162,6 +164,20 @@ struct Recording {
     const auto image = image_file("thermal", frame, camera, thermal_imager ? thermal_imager->width : 0,
                                   thermal_imager ? thermal_imager->height : 0);
     return image ? std::optional<Image<std::uint16_t>>(parse_png_grey16(image->bytes, image->name)) : std::nullopt;
+  }
+
+  /// Where liquid was seen: the mask or, where a frame has none but a thermal image, the label of that
+  /// (ThermalLabel); nothing for a frame with neither. What the thermal imager does not see counts as no liquid. Else as
+  /// mask().
+  std::optional<Mask> liquid_mask(std::size_t frame, std::size_t camera = 0) const {
+    std::optional<Mask> label = mask(frame, camera);
+    if (!label && thermal_imager) {
+      if (const auto image = thermal(frame, camera)) {
+        label.emplace(height, width);
+        ThermalLabel(thermal_imager->threshold, AffineMap(thermal_imager->image_from_thermal)).label(*image, *label);
+      }
+    }
+    return label;
   }
 
   /// The colour picture of a frame, of any size, or nothing; else as mask().
