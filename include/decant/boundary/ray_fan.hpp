@@ -18,7 +18,7 @@
 namespace decant {
 
 /// `Count` directions, a multiple of 8, that are asked for together again and again. first_hits answers what
-/// BoundingVolumeHierarchy::first_hit does for each ray, ten times as fast where the rays are short: the triangles
+/// BoundingVolumeHierarchy::first_hit does for each ray, several times as fast where rays are short: the triangles
 /// within reach are gone through once, and each is held against the rays in bundles of eight neighbours.
 ///
 /// The hits are those of first_hit, to rounding: a ray that passes an edge, a corner or a triangle's plane within the
