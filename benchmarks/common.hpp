@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// What all benchmarks share: a clock, medians, test liquids, and rows of CSV that name the circumstances.
+/// What all benchmarks share: a clock, medians, test liquids, a test cup, and rows of CSV that name the circumstances.
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <functional>
@@ -12,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
@@ -139,6 +142,36 @@ decant::PointArray<Scalar> resting_liquid(Index per_edge, double spacing) {
     position.col(i).swap(position.col(static_cast<Index>(generator() % static_cast<unsigned>(i + 1))));
   }
   return position;
+}
+
+/// A cup with 3 mm walls, 0.09 m high, whose outline has `steps` pieces and is turned in as many: 2 steps^2 triangles.
+inline decant::TriangleMesh cup(std::uint32_t steps) {
+  const std::vector<Eigen::Vector2d> outline{{0.001, -0.003}, {0.033, -0.003}, {0.043, 0.09},
+                                             {0.040, 0.09},   {0.030, 0},      {0.001, 0}};
+  double length = 0;
+  for (std::size_t k = 0; k < outline.size(); ++k) {
+    length += (outline[(k + 1) % outline.size()] - outline[k]).norm();
+  }
+  decant::TriangleMesh mesh;
+  for (std::uint32_t i = 0; i < steps; ++i) {
+    double way = length * i / steps;
+    std::size_t piece = 0;
+    const auto size = [&] { return (outline[(piece + 1) % outline.size()] - outline[piece]).norm(); };
+    while (way > size()) {
+      way -= size();
+      ++piece;
+    }
+    const Eigen::Vector2d at = outline[piece] + way / size() * (outline[(piece + 1) % outline.size()] - outline[piece]);
+    for (std::uint32_t j = 0; j < steps; ++j) {
+      const double turn = 2 * 3.14159265358979 * j / steps;
+      mesh.vertices.emplace_back(at.x() * std::cos(turn), at.x() * std::sin(turn), at.y());
+      const std::uint32_t next_i = (i + 1) % steps;
+      const std::uint32_t next_j = (j + 1) % steps;
+      mesh.triangles.push_back({i * steps + j, i * steps + next_j, next_i * steps + j});
+      mesh.triangles.push_back({i * steps + next_j, next_i * steps + next_j, next_i * steps + j});
+    }
+  }
+  return mesh;
 }
 
 }  // namespace decant_benchmark

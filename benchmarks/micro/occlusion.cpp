@@ -36,36 +36,6 @@ using Point = decant::Vector3<double>;
 constexpr std::size_t poses = 16;
 constexpr Index point_count = 8000;
 
-// A cup with 3 mm walls whose outline has `steps` pieces and is turned in as many: 2 steps^2 triangles.
-decant::TriangleMesh cup(std::uint32_t steps) {
-  const std::vector<Eigen::Vector2d> outline{{0.001, -0.003}, {0.033, -0.003}, {0.043, 0.09},
-                                             {0.040, 0.09},   {0.030, 0},      {0.001, 0}};
-  double length = 0;
-  for (std::size_t k = 0; k < outline.size(); ++k) {
-    length += (outline[(k + 1) % outline.size()] - outline[k]).norm();
-  }
-  decant::TriangleMesh mesh;
-  for (std::uint32_t i = 0; i < steps; ++i) {
-    double way = length * i / steps;
-    std::size_t piece = 0;
-    const auto size = [&] { return (outline[(piece + 1) % outline.size()] - outline[piece]).norm(); };
-    while (way > size()) {
-      way -= size();
-      ++piece;
-    }
-    const Eigen::Vector2d at = outline[piece] + way / size() * (outline[(piece + 1) % outline.size()] - outline[piece]);
-    for (std::uint32_t j = 0; j < steps; ++j) {
-      const double turn = 2 * 3.14159265358979 * j / steps;
-      mesh.vertices.emplace_back(at.x() * std::cos(turn), at.x() * std::sin(turn), at.y());
-      const std::uint32_t next_i = (i + 1) % steps;
-      const std::uint32_t next_j = (j + 1) % steps;
-      mesh.triangles.push_back({i * steps + j, i * steps + next_j, next_i * steps + j});
-      mesh.triangles.push_back({i * steps + next_j, next_i * steps + next_j, next_i * steps + j});
-    }
-  }
-  return mesh;
-}
-
 // From all around, more or less from above.
 std::vector<decant::Pose> camera_poses() {
   std::vector<decant::Pose> result;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <random>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/mesh_wall.hpp>
@@ -9,6 +11,7 @@
 #include <decant/boundary/wall_function.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 
+#include "boundary/mesh_samples.hpp"
 #include "catch.hpp"
 
 using decant::Vector3;
@@ -85,6 +88,99 @@ TEST_CASE("direct mesh wall sums reach the accuracy that is documented") {
     REQUIRE(wall.sample_directly({0.05 + a * spacing, 0, -0.01}, sample));
     CHECK(sample.share == Approx(plane.share(a * spacing)).margin(0.004 * 0.5));
   }
+}
+
+TEST_CASE("direct mesh wall sums are those over rays that are asked for one by one") {
+  const double pi = std::acos(-1.0);
+  decant::TriangleMesh ball = decant_test::bumpy_ball(12, 0.1, 1);
+  for (Vector3<double>& vertex : ball.vertices) {
+    vertex *= 0.03;
+  }
+  const decant::BoundingVolumeHierarchy surface(ball);
+  const auto wall = decant::MeshWall::of<Kernel>(surface, spacing, spacing, {});
+  const auto plane = decant::WallFunction::of<Kernel>(spacing, spacing);
+  std::mt19937 random(2);
+  int found = 0;
+  for (int n = 0; n < 300; ++n) {
+    const Vector3<double> x = decant_test::random_point(random, Vector3<double>::Zero(), 0.036);
+    decant::WallSample sample, sum;
+    const bool near = wall.sample_directly(x, sample);
+    sum.share = 0;
+    sum.gradient.setZero();
+    sum.moment.setZero();
+    for (int k = 0; k < 128; ++k) {  // a Fibonacci lattice
+      const double z = 1 - 2 * (k + 0.5) / 128;
+      const double angle = pi * (3 - std::sqrt(5.0)) * k;
+      const double radius = std::sqrt(1 - z * z);
+      const Vector3<double> direction(radius * std::cos(angle), radius * std::sin(angle), z);
+      if (const auto hit = surface.first_hit_along(x, direction, wall.reach())) {
+        const double t = hit->fraction * wall.reach();
+        const double facing = direction.dot(hit->normal);
+        const double pull = t * plane.radius_times_weight(t) + plane.slope(t) / pi;
+        sum.share += 4 * pi / 128 * (plane.share(t) + t * plane.slope(t)) / (2 * pi);
+        sum.gradient += 4 * pi / 128 * pull * direction;
+        sum.moment += 4 * pi / 128 * pull * t * facing * facing * hit->normal * hit->normal.transpose();
+      }
+    }
+    REQUIRE(near == (sum.share > 0));
+    if (near) {
+      ++found;
+      REQUIRE(sample.distance == surface.closest_point(x, 1)->distance);
+      // the same rays: what is left is rounding
+      REQUIRE(std::abs(sample.share - sum.share) < 1e-12);
+      REQUIRE((sample.gradient - sum.gradient).norm() < 1e-12 * plane.slope(0));
+      REQUIRE((sample.moment - sum.moment).norm() < 1e-12 * plane.slope(0) * spacing);
+    }
+  }
+  REQUIRE(found > 50);
+}
+
+TEST_CASE("a mesh wall is the same whatever the number of threads, and has direct sums at all its nodes") {
+  decant::TriangleMesh ball = decant_test::bumpy_ball(12, 0.1, 3);
+  for (Vector3<double>& vertex : ball.vertices) {
+    vertex *= 0.03;
+  }
+  const decant::BoundingVolumeHierarchy surface(ball);
+  const auto plane = decant::WallFunction::of<Kernel>(spacing, spacing);
+  const std::array<decant::MeshWall, 3> walls{decant::MeshWall::of<Kernel>(surface, spacing, spacing, {1}),
+                                              decant::MeshWall::of<Kernel>(surface, spacing, spacing, {2}),
+                                              decant::MeshWall::of<Kernel>(surface, spacing, spacing, {4})};
+  const double cell = spacing / decant::MeshWall::cells_per_spacing;
+  const Vector3<double> origin = surface.bounds().min().array() - (walls[0].reach() + cell);
+  std::mt19937 random(4);
+  int at_nodes = 0, at_borders = 0;
+  for (int n = 0; n < 20000; ++n) {
+    const Vector3<double> place = (decant_test::random_point(random, Vector3<double>::Zero(), 0.036) - origin) / cell;
+    // beside a node, in one of the eight cells around it; every other one on a border between blocks of eight cells
+    Vector3<double> node = place.array().round();
+    if (n % 2 == 0) {
+      node[n / 2 % 3] = 8 * std::round(node[n / 2 % 3] / 8);
+    }
+    const Vector3<double> side = (place - node).array().sign();
+    const Vector3<double> x = origin + cell * (node + 1e-6 * side);
+    decant::WallSample sample, other, direct;
+    const bool near = walls[0].sample(x, sample);
+    for (const decant::MeshWall& wall : walls) {
+      REQUIRE(near == wall.sample(x, other));
+      REQUIRE((!near || (sample.share == other.share && sample.distance == other.distance &&
+                         sample.gradient == other.gradient && sample.moment == other.moment)));
+    }
+    // where the surface passes through the cell or the wall is hardly felt, the grid is not asked or holds a plane
+    if (surface.closest_point(origin + cell * (node + 0.5 * side), 0.87 * cell) ||
+        !walls[0].sample_directly(x, direct) || plane.distance_for(direct.share) > 0.89 * plane.reach()) {
+      continue;
+    }
+    ++(n % 2 == 0 ? at_borders : at_nodes);
+    INFO("node " << node.transpose() << ", side " << side.transpose());
+    REQUIRE(near);
+    // 1e-6 of a cell off the node, and stored in float
+    REQUIRE(sample.share == Approx(direct.share).margin(1e-5));
+    REQUIRE(sample.distance == Approx(direct.distance).margin(1e-5 * spacing));
+    REQUIRE((sample.gradient - direct.gradient).norm() < 1e-4 * plane.slope(0));
+    REQUIRE((sample.moment - direct.moment).norm() < 1e-4 * plane.slope(0) * spacing);
+  }
+  REQUIRE(at_nodes > 1000);
+  REQUIRE(at_borders > 1000);
 }
 
 TEST_CASE("mesh wall and solid parts agree in a corner") {

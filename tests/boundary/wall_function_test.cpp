@@ -46,6 +46,12 @@ TEST_CASE("wall function and its slope and weight belong together") {
     CHECK(wall.slope(a * d) ==
           Approx((wall.share(a * d - step) - wall.share(a * d + step)) / (2 * step)).epsilon(1e-5));
   }
+  for (const double a : {0.0, 1e-3, 0.3, 0.9, 0.9999, 1.0, 1.5}) {
+    const auto terms = wall.terms(a * d);
+    CHECK(terms.share == Approx(wall.share(a * d)).epsilon(1e-13));
+    CHECK(terms.slope == Approx(wall.slope(a * d)).epsilon(1e-13));
+    CHECK(terms.radius_times_weight == Approx(wall.radius_times_weight(a * d)).epsilon(1e-13));
+  }
   // int over the half-space behind a plane of w(r) dV = int_a^R 2 pi r w(r) (r - a) dr
   const double a = 0.3 * d;
   const int steps = 20000;

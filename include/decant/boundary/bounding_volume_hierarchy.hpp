@@ -18,6 +18,7 @@
 #include <emmintrin.h>
 #endif
 
+#include <decant/boundary/detail/segment_triangle.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/types.hpp>
@@ -110,10 +111,16 @@ class BoundingVolumeHierarchy {
   /// Calls f(a, b, c) with the corners of each triangle in the tree [m], in an order of the tree's own.
   template <class Function>
   void for_each_triangle(Function&& f) const {
-    for (const LeafTriangle& triangle : leaf_triangles_) {
+    for (const detail::TreeTriangle& triangle : leaf_triangles_) {
       f(triangle.a, triangle.b, triangle.c);
     }
   }
+
+  /// Calls f(triangle) for each triangle within max_distance of x [m], and for some that are a little farther, by and
+  /// large from near to far. `triangle` is a detail::TreeTriangle: its corners a, b, c [m] and its index in the mesh;
+  /// it stays where it is as long as the hierarchy does.
+  template <class Function>
+  void for_each_triangle_near(const Vector3<double>& x, double max_distance, Function&& f) const;
 
  private:
   static constexpr std::uint32_t leaf_flag = 0x80000000U;
@@ -123,6 +130,8 @@ class BoundingVolumeHierarchy {
   static constexpr int sah_depth = 24;
   // 3 entries more per level; 4-way halving adds 14 levels for 2^28 triangles.
   static constexpr int stack_size = 3 * (sah_depth + 16) + 4;
+  // Squared distances to boxes are rounded: the factor leaves room for it, the pad of the boxes for that of the place.
+  static constexpr double room = 1.0001;
 
   // Boxes as centre and half size, in float relative to the middle of the mesh, rounded outward.
   struct Node {
@@ -131,22 +140,9 @@ class BoundingVolumeHierarchy {
     std::uint32_t child[4];  // a node, or leaf_flag | (count - 1) << 28 | first triangle, or no_child
   };
 
-  struct LeafTriangle {
-    Vector3<double> a, b, c;
-    std::uint32_t index;
-  };
-
   // A segment as the boxes see it.
   struct FloatSegment {
     detail::Float4 middle[3], half[3], direction[3], size[3];
-  };
-
-  struct Crossing {
-    bool hit = false;
-    bool grazing = false;  // too close to an edge or to the plane for a count of crossings
-    double fraction = 0;
-    double u = 0, v = 0, w = 0;  // barycentric weights of a, b, c
-    double side = 0;             // > 0: from front to back
   };
 
   struct Crossings {
@@ -172,16 +168,7 @@ class BoundingVolumeHierarchy {
   Crossings crossings(const Vector3<double>& a, const Vector3<double>& b) const noexcept;
   FloatSegment to_float(const Vector3<double>& from, const Vector3<double>& to) const noexcept;
   static unsigned overlapping(const Node& node, const FloatSegment& segment) noexcept;
-  static Crossing cross(const LeafTriangle& triangle, const Vector3<double>& from, const Vector3<double>& to,
-                        bool nearby = false) noexcept;
-  static Crossing cross_nearby(const LeafTriangle& triangle, const Vector3<double>& from, const Vector3<double>& to,
-                               double slack) noexcept;
-  static Crossing cross_in_plane(const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c,
-                                 const Vector3<double>& normal, const Vector3<double>& d, double tolerance) noexcept;
-  static Vector3<double> closest_on(const LeafTriangle& triangle, const Vector3<double>& x) noexcept;
-  static Vector3<double> unit_normal(const LeafTriangle& triangle) noexcept {
-    return (triangle.b - triangle.a).cross(triangle.c - triangle.a).normalized();
-  }
+  static detail::Float4 distances_squared(const Node& node, const detail::Float4 (&x)[3]) noexcept;
   // Calls visit(triangle) for every triangle whose box the segment may meet, until it returns true.
   template <class Visit>
   bool walk(const Vector3<double>& from, const Vector3<double>& to, Visit&& visit) const noexcept;
@@ -191,7 +178,7 @@ class BoundingVolumeHierarchy {
   double radius_ = 0;       // largest half extent of the bounds
   float pad_ = 0;           // what float rounding may move a coordinate by, with room
   std::vector<Node> nodes_;
-  std::vector<LeafTriangle> leaf_triangles_;
+  std::vector<detail::TreeTriangle> leaf_triangles_;
 };
 
 inline BoundingVolumeHierarchy::BoundingVolumeHierarchy(const TriangleMesh& mesh) {
@@ -360,44 +347,17 @@ inline std::uint32_t BoundingVolumeHierarchy::build(std::vector<Item>& items, co
   return at;
 }
 
-// Nearest point of a triangle by the region that x projects into (C. Ericson, Real-Time Collision Detection, 2005,
-// section 5.1.5).
-inline Vector3<double> BoundingVolumeHierarchy::closest_on(const LeafTriangle& triangle,
-                                                           const Vector3<double>& x) noexcept {
-  const Vector3<double> ab = triangle.b - triangle.a;
-  const Vector3<double> ac = triangle.c - triangle.a;
-  const Vector3<double> ax = x - triangle.a;
-  const double d1 = ab.dot(ax);
-  const double d2 = ac.dot(ax);
-  if (d1 <= 0 && d2 <= 0) {
-    return triangle.a;
+// From a point relative to the middle of the mesh to the boxes, rounded: the pad of the boxes makes up for it.
+inline detail::Float4 BoundingVolumeHierarchy::distances_squared(const Node& node,
+                                                                 const detail::Float4 (&x)[3]) noexcept {
+  const detail::Float4 zero{};
+  detail::Float4 sum{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const detail::Float4 beyond = detail::absolute(node.center[axis] - x[axis]) - node.half[axis];
+    const detail::Float4 outside = beyond > zero ? beyond : zero;
+    sum += outside * outside;
   }
-  const Vector3<double> bx = x - triangle.b;
-  const double d3 = ab.dot(bx);
-  const double d4 = ac.dot(bx);
-  if (d3 >= 0 && d4 <= d3) {
-    return triangle.b;
-  }
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) {
-    return triangle.a + d1 / (d1 - d3) * ab;
-  }
-  const Vector3<double> cx = x - triangle.c;
-  const double d5 = ab.dot(cx);
-  const double d6 = ac.dot(cx);
-  if (d6 >= 0 && d5 <= d6) {
-    return triangle.c;
-  }
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) {
-    return triangle.a + d2 / (d2 - d6) * ac;
-  }
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-    return triangle.b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (triangle.c - triangle.b);
-  }
-  const double scale = 1 / (va + vb + vc);
-  return triangle.a + vb * scale * ab + vc * scale * ac;
+  return sum;
 }
 
 inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, double max_distance) const noexcept
@@ -408,13 +368,11 @@ inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, dou
     return std::nullopt;
   }
   using detail::Float4;
-  const Float4 qx = detail::broadcast(static_cast<float>(local[0]));
-  const Float4 qy = detail::broadcast(static_cast<float>(local[1]));
-  const Float4 qz = detail::broadcast(static_cast<float>(local[2]));
-  // Squared distances to boxes are rounded: the factor leaves room for it, the pad of the boxes for that of x.
-  constexpr double room = 1.0001;
+  const Float4 from[3] = {detail::broadcast(static_cast<float>(local[0])),
+                          detail::broadcast(static_cast<float>(local[1])),
+                          detail::broadcast(static_cast<float>(local[2]))};
   double best = std::min(max_distance * max_distance, 1e29);
-  const LeafTriangle* nearest = nullptr;
+  const detail::TreeTriangle* nearest = nullptr;
   Vector3<double> point = Vector3<double>::Zero();
 
   struct Entry {
@@ -433,7 +391,7 @@ inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, dou
       const std::uint32_t first = entry.child & 0x0FFFFFFFU;
       const std::uint32_t last = first + ((entry.child >> 28) & 7U);
       for (std::uint32_t t = first; t <= last; ++t) {
-        const Vector3<double> candidate = closest_on(leaf_triangles_[t], x);
+        const Vector3<double> candidate = detail::closest_on(leaf_triangles_[t], x);
         const double distance_squared = (x - candidate).squaredNorm();
         if (distance_squared < best || (nearest == nullptr && distance_squared <= best)) {
           best = distance_squared;
@@ -444,14 +402,7 @@ inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, dou
       continue;
     }
     const Node& node = nodes_[entry.child];
-    Float4 dx = detail::absolute(node.center[0] - qx) - node.half[0];
-    Float4 dy = detail::absolute(node.center[1] - qy) - node.half[1];
-    Float4 dz = detail::absolute(node.center[2] - qz) - node.half[2];
-    const Float4 zero{};
-    dx = dx > zero ? dx : zero;
-    dy = dy > zero ? dy : zero;
-    dz = dz > zero ? dz : zero;
-    const Float4 distance_squared = dx * dx + dy * dy + dz * dz;
+    const Float4 distance_squared = distances_squared(node, from);
     const Float4 limit = detail::broadcast(static_cast<float>(best * room));
     unsigned open = detail::lanes(distance_squared <= limit);
     // farthest first onto the stack, so that the nearest is looked at next
@@ -472,7 +423,54 @@ inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, dou
   if (nearest == nullptr) {
     return std::nullopt;
   }
-  return Closest{point, std::sqrt(best), unit_normal(*nearest), nearest->index};
+  return Closest{point, std::sqrt(best), nearest->unit_normal(), nearest->index};
+}
+
+template <class Function>
+void BoundingVolumeHierarchy::for_each_triangle_near(const Vector3<double>& x, double max_distance,
+                                                     Function&& f) const {
+  const Vector3<double> local = x - center_;
+  if (!(local.cwiseAbs().maxCoeff() < 1e14) || !(max_distance >= 0)) {
+    return;  // as in closest_point
+  }
+  using detail::Float4;
+  const Float4 from[3] = {detail::broadcast(static_cast<float>(local[0])),
+                          detail::broadcast(static_cast<float>(local[1])),
+                          detail::broadcast(static_cast<float>(local[2]))};
+  const Float4 limit = detail::broadcast(static_cast<float>(std::min(max_distance * max_distance, 1e29) * room));
+  std::array<std::uint32_t, stack_size> stack;
+  int top = 0;
+  stack[static_cast<std::size_t>(top++)] = 0;
+  while (top > 0) {
+    const std::uint32_t child = stack[static_cast<std::size_t>(--top)];
+    if ((child & leaf_flag) != 0) {
+      const std::uint32_t first = child & 0x0FFFFFFFU;
+      const std::uint32_t last = first + ((child >> 28) & 7U);
+      for (std::uint32_t t = first; t <= last; ++t) {
+        f(std::as_const(leaf_triangles_[t]));
+      }
+      continue;
+    }
+    const Node& node = nodes_[child];
+    const Float4 distance_squared = distances_squared(node, from);
+    unsigned open = detail::lanes(distance_squared <= limit);
+    // farthest first onto the stack, so that the nearest is looked at next
+    std::array<float, 4> keys;
+    const int bottom = top;
+    for (int k = 0; open != 0; ++k, open >>= 1) {
+      if ((open & 1U) == 0) {
+        continue;
+      }
+      int place = top++;
+      while (place > bottom && keys[static_cast<std::size_t>(place - 1 - bottom)] < distance_squared[k]) {
+        keys[static_cast<std::size_t>(place - bottom)] = keys[static_cast<std::size_t>(place - 1 - bottom)];
+        stack[static_cast<std::size_t>(place)] = stack[static_cast<std::size_t>(place - 1)];
+        --place;
+      }
+      keys[static_cast<std::size_t>(place - bottom)] = distance_squared[k];
+      stack[static_cast<std::size_t>(place)] = node.child[k];
+    }
+  }
 }
 
 // Cuts a long segment down to where the mesh is, so that what follows has coordinates of the mesh's size.
@@ -545,129 +543,6 @@ inline unsigned BoundingVolumeHierarchy::overlapping(const Node& node, const Flo
   return detail::lanes(open);
 }
 
-// Corners are relative to the segment's origin. Cuts the segment by the three edges within the triangle's plane.
-inline auto BoundingVolumeHierarchy::cross_in_plane(const Vector3<double>& a, const Vector3<double>& b,
-                                                    const Vector3<double>& c, const Vector3<double>& normal,
-                                                    const Vector3<double>& d, double tolerance) noexcept -> Crossing {
-  double enter = 0;
-  double leave = 1;
-  const std::array<const Vector3<double>*, 3> corner{&a, &b, &c};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vector3<double>& p = *corner[k];
-    const Vector3<double> inward = normal.cross(*corner[(k + 1) % 3] - p);
-    const double slack = tolerance * inward.norm();
-    const double start = -inward.dot(p) + slack;  // >= 0: the origin is on the inner side of this edge
-    const double rate = inward.dot(d);
-    const double end = start + rate;
-    if (start < 0 && end < 0) {
-      return {};
-    }
-    if (start < 0) {
-      enter = std::max(enter, -start / rate);
-    } else if (end < 0) {
-      leave = std::min(leave, -start / rate);
-    }
-  }
-  if (enter > leave) {
-    return {};
-  }
-  Crossing crossing;
-  crossing.hit = true;
-  crossing.grazing = true;
-  crossing.fraction = enter;
-  const Vector3<double> p = enter * d;
-  crossing.u = std::max(0.0, normal.dot((b - p).cross(c - p)));
-  crossing.v = std::max(0.0, normal.dot((c - p).cross(a - p)));
-  crossing.w = std::max(0.0, normal.dot((a - p).cross(b - p)));
-  return crossing;
-}
-
-// A triangle that is tiny or narrow against the segment drowns in the bounds of rounding. Near the triangle all lengths
-// are of its size, and the bounds with them, so the segment is cut down to the triangle's box first.
-inline auto BoundingVolumeHierarchy::cross_nearby(const LeafTriangle& triangle, const Vector3<double>& from,
-                                                  const Vector3<double>& to, double slack) noexcept -> Crossing {
-  const Vector3<double> low = triangle.a.cwiseMin(triangle.b).cwiseMin(triangle.c) - from;
-  const Vector3<double> high = triangle.a.cwiseMax(triangle.b).cwiseMax(triangle.c) - from;
-  const Vector3<double> d = to - from;
-  double enter = 0;
-  double leave = 1;
-  for (Index axis = 0; axis < 3; ++axis) {
-    const double below = low[axis] - slack;
-    const double above = high[axis] + slack;
-    if (std::abs(d[axis]) <= slack) {
-      if (below > slack || above < -slack) {
-        return {};
-      }
-      continue;
-    }
-    enter = std::max(enter, (d[axis] > 0 ? below : above) / d[axis]);
-    leave = std::min(leave, (d[axis] > 0 ? above : below) / d[axis]);
-  }
-  if (enter > leave) {
-    return {};
-  }
-  Crossing crossing = cross(triangle, from + enter * d, from + leave * d, true);
-  crossing.fraction = enter + crossing.fraction * (leave - enter);
-  crossing.grazing = true;
-  return crossing;
-}
-
-// Signs of tetrahedron volumes. In exact arithmetic a segment that leaves a closed surface has a triangle whose plane
-// it crosses and whose three edges it passes on the same side (or on the edge); each sign is taken with a bound of its
-// rounding error, about 24 products of two roundings each, so that this triangle is found in floating point as well.
-inline auto BoundingVolumeHierarchy::cross(const LeafTriangle& triangle, const Vector3<double>& from,
-                                           const Vector3<double>& to, bool nearby) noexcept -> Crossing {
-  constexpr double rounding = 256 * std::numeric_limits<double>::epsilon();
-  const Vector3<double> a = triangle.a - from;
-  const Vector3<double> b = triangle.b - from;
-  const Vector3<double> c = triangle.c - from;
-  const Vector3<double> d = to - from;
-  const Vector3<double> normal = (b - a).cross(c - a);
-  const Vector3<double> largest = a.cwiseAbs().cwiseMax(b.cwiseAbs()).cwiseMax(c.cwiseAbs());
-  const double length = d.cwiseAbs().maxCoeff();
-  const double size = largest.maxCoeff() + length;
-  const double plane_error = rounding * size * size * size;
-  const double before = -normal.dot(a);  // of the origin, > 0 on the front
-  const double after = normal.dot(d) + before;
-  if ((before > plane_error && after > plane_error) || (before < -plane_error && after < -plane_error)) {
-    return {};
-  }
-  // The edges' volumes share the length of the segment as a factor, hence their own, smaller bound.
-  const double edge_error = rounding * size * size * length;
-  const Vector3<double> db = d.cross(b);
-  const double u = -db.dot(c);
-  const double v = -d.cross(c).dot(a);
-  const double w = db.dot(a);
-  const bool front = u >= -edge_error && v >= -edge_error && w >= -edge_error;
-  const bool back = u <= edge_error && v <= edge_error && w <= edge_error;
-  if (!front && !back) {
-    return {};
-  }
-  const double sum = u + v + w;
-  if (std::abs(sum) <= 8 * edge_error) {
-    if (!nearby) {
-      return cross_nearby(triangle, from, to, rounding * size);
-    }
-    if (std::abs(before) > 16 * plane_error && std::abs(after) > 16 * plane_error) {
-      return {};  // parallel, at a distance
-    }
-    return cross_in_plane(a, b, c, normal, d, rounding * size);
-  }
-  Crossing crossing;
-  crossing.hit = true;
-  crossing.side = before - after;
-  const double sign = sum > 0 ? 1 : -1;
-  crossing.u = std::max(0.0, sign * u);
-  crossing.v = std::max(0.0, sign * v);
-  crossing.w = std::max(0.0, sign * w);
-  crossing.grazing = std::min({sign * u, sign * v, sign * w}) <= edge_error || std::abs(before) <= plane_error ||
-                     std::abs(after) <= plane_error;
-  const double scale = 1 / (crossing.u + crossing.v + crossing.w);
-  const Vector3<double> point = scale * (crossing.u * a + crossing.v * b + crossing.w * c);
-  crossing.fraction = std::clamp(point.dot(d) / d.squaredNorm(), 0.0, 1.0);
-  return crossing;
-}
-
 template <class Visit>
 bool BoundingVolumeHierarchy::walk(const Vector3<double>& from, const Vector3<double>& to,
                                    Visit&& visit) const noexcept {
@@ -728,11 +603,11 @@ inline auto BoundingVolumeHierarchy::first_hit(const Vector3<double>& origin,
   if (!clip(from, to, t_from, t_to)) {
     return std::nullopt;
   }
-  Crossing best;
+  detail::TriangleCrossing best;
   best.fraction = 2;
-  const LeafTriangle* hit = nullptr;
-  walk(from, to, [&](const LeafTriangle& triangle, FloatSegment& segment) {
-    const Crossing crossing = cross(triangle, from, to);
+  const detail::TreeTriangle* hit = nullptr;
+  walk(from, to, [&](const detail::TreeTriangle& triangle, FloatSegment& segment) {
+    const detail::TriangleCrossing crossing = detail::cross(triangle, from, to);
     if (crossing.hit && crossing.fraction < best.fraction) {
       best = crossing;
       hit = &triangle;
@@ -748,8 +623,8 @@ inline auto BoundingVolumeHierarchy::first_hit(const Vector3<double>& origin,
   Hit result;
   result.fraction = t_from + best.fraction * (t_to - t_from);
   result.point = sum > 0 ? Vector3<double>((best.u * hit->a + best.v * hit->b + best.w * hit->c) / sum)
-                         : closest_on(*hit, from + best.fraction * (to - from));
-  result.normal = unit_normal(*hit);
+                         : detail::closest_on(*hit, from + best.fraction * (to - from));
+  result.normal = hit->unit_normal();
   result.triangle = hit->index;
   return result;
 }
@@ -759,8 +634,9 @@ inline bool BoundingVolumeHierarchy::any_hit(const Vector3<double>& a, const Vec
   Vector3<double> to = b;
   double t_from = 0;
   double t_to = 1;
-  return clip(from, to, t_from, t_to) &&
-         walk(from, to, [&](const LeafTriangle& triangle, FloatSegment&) { return cross(triangle, from, to).hit; });
+  return clip(from, to, t_from, t_to) && walk(from, to, [&](const detail::TreeTriangle& triangle, FloatSegment&) {
+           return detail::cross(triangle, from, to).hit;
+         });
 }
 
 inline auto BoundingVolumeHierarchy::crossings(const Vector3<double>& a, const Vector3<double>& b) const noexcept
@@ -773,8 +649,8 @@ inline auto BoundingVolumeHierarchy::crossings(const Vector3<double>& a, const V
   if (!clip(from, to, t_from, t_to)) {
     return found;
   }
-  walk(from, to, [&](const LeafTriangle& triangle, FloatSegment&) {
-    const Crossing crossing = cross(triangle, from, to);
+  walk(from, to, [&](const detail::TreeTriangle& triangle, FloatSegment&) {
+    const detail::TriangleCrossing crossing = detail::cross(triangle, from, to);
     if (crossing.hit) {
       ++found.count;
       found.winding += crossing.side < 0 ? 1 : -1;

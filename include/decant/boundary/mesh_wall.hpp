@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/ray_fan.hpp>
 #include <decant/boundary/wall_function.hpp>
 #include <decant/boundary/wall_sample.hpp>
 #include <decant/core/expects.hpp>
@@ -62,37 +63,57 @@ class MeshWall {
     }
   }
 
-  /// The sum over directions at x itself: slower by a factor of about a hundred, exact at any place.
+  /// The sum over directions at x itself: slower by a factor of some tens, exact at any place.
   bool sample_directly(const Vector3<double>& x, WallSample& result) const noexcept {
     const auto nearest = surface_->closest_point(x, reach());
     if (!nearest) {
       return false;
     }
     result.distance = nearest->distance;
+    return add_up_directions(x, result);
+  }
+
+ private:
+  enum class LookUp { Far, Found, Crossed };
+
+  // All of a sample but the distance.
+  bool add_up_directions(const Vector3<double>& x, WallSample& result) const noexcept {
     result.share = 0;
     result.gradient.setZero();
     result.moment.setZero();
-    for (const Vector3<double>& direction : directions()) {
-      const auto hit = surface_->first_hit(x, x + reach() * direction);
-      if (!hit) {
-        continue;
+    const RayFan<direction_count>& fan = directions();
+    // rays side by side often meet one triangle: their moments share a normal
+    std::uint32_t triangle = 0;
+    Vector3<double> normal = Vector3<double>::Zero();
+    double moment = 0;
+    const auto add_moment = [&] {
+      for (Index column = 0; column < 3; ++column) {
+        result.moment.col(column) += moment * normal[column] * normal;
       }
-      const double t = hit->fraction * reach();
-      result.share += (plane_.share(t) + t * plane_.slope(t)) / (2 * pi);
-      const double pull = t * plane_.radius_times_weight(t) + plane_.slope(t) / pi;
-      const double facing = direction.dot(hit->normal);
+      moment = 0;
+    };
+    fan.first_hits(*surface_, x, reach(), [&](std::size_t k, const BoundingVolumeHierarchy::Hit& hit) {
+      if (hit.triangle != triangle) {
+        add_moment();
+        triangle = hit.triangle;
+      }
+      normal = hit.normal;
+      const Vector3<double>& direction = fan.direction(k);
+      const double t = hit.fraction * reach();
+      const WallFunction::Terms plane = plane_.terms(t);
+      result.share += (plane.share + t * plane.slope) / (2 * pi);
+      const double pull = t * plane.radius_times_weight + plane.slope / pi;
+      const double facing = direction.dot(normal);
       result.gradient += pull * direction;
-      result.moment += pull * t * facing * facing * hit->normal * hit->normal.transpose();
-    }
+      moment += pull * t * facing * facing;
+    });
+    add_moment();
     const double solid_angle = 4 * pi / static_cast<double>(direction_count);
     result.share *= solid_angle;
     result.gradient *= solid_angle;
     result.moment *= solid_angle;
     return result.share > 0;
   }
-
- private:
-  enum class LookUp { Far, Found, Crossed };
 
   /// From the grid; a cell that the surface passes through has corners that see different sides, and no answer.
   LookUp look_up(const Vector3<double>& x, WallSample& result) const noexcept {
@@ -114,7 +135,7 @@ class MeshWall {
     }
     const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
     const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
-    if (nodes.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)]) {
+    if (nodes.crossed[cell_number(i, j, k)]) {
       return LookUp::Crossed;
     }
     NodeValues mean = NodeValues::Zero();
@@ -173,8 +194,14 @@ class MeshWall {
     std::bitset<block_cells * block_cells * block_cells> crossed;
   };
 
+  using Place = std::array<int, 3>;  // of a block in the table
+
   static std::size_t node_number(int i, int j, int k) noexcept {
     return static_cast<std::size_t>((k * block_nodes + j) * block_nodes + i);
+  }
+
+  static std::size_t cell_number(int i, int j, int k) noexcept {
+    return static_cast<std::size_t>((k * block_cells + j) * block_cells + i);
   }
 
   std::size_t block_number(int i, int j, int k) const noexcept {
@@ -184,8 +211,8 @@ class MeshWall {
   }
 
   /// Evenly spread over the sphere (Fibonacci lattice), the same everywhere so that the sum varies smoothly in space.
-  static const std::array<Vector3<double>, direction_count>& directions() noexcept {
-    static const std::array<Vector3<double>, direction_count> all = [] {
+  static const RayFan<direction_count>& directions() noexcept {
+    static const RayFan<direction_count> all = [] {
       std::array<Vector3<double>, direction_count> made;
       const double golden_angle = pi * (3 - std::sqrt(5.0));
       for (std::size_t k = 0; k < direction_count; ++k) {
@@ -194,7 +221,7 @@ class MeshWall {
         const double angle = golden_angle * static_cast<double>(k);
         made[k] = {radius * std::cos(angle), radius * std::sin(angle), z};
       }
-      return made;
+      return RayFan<direction_count>(made);
     }();
     return all;
   }
@@ -215,7 +242,7 @@ class MeshWall {
       blocks_[static_cast<std::size_t>(axis)] = static_cast<int>(count);
     }
     block_of_.assign(static_cast<std::size_t>(blocks), -1);
-    std::vector<std::array<int, 3>> used;
+    std::vector<Place> used;
     const double half_diagonal = 0.5 * std::sqrt(3.0) * block_size;
     for (int k = 0; k < blocks_[2]; ++k) {
       for (int j = 0; j < blocks_[1]; ++j) {
@@ -232,50 +259,93 @@ class MeshWall {
     for (auto& block : block_data_) {
       block = std::make_unique<Block>();
     }
-    parallel_ranges(static_cast<Index>(used.size()), threads, 1, [&](Index b, Index) {
-      const auto& place = used[static_cast<std::size_t>(b)];
-      fill(*block_data_[static_cast<std::size_t>(b)],
-           origin_ + block_size * Vector3<double>(place[0], place[1], place[2]));
-    });
+    // Every node is computed by one block, the one that it begins or the only one that there is, and copied to others.
+    const auto for_each_block = [&](auto&& f) {
+      parallel_ranges(static_cast<Index>(used.size()), threads, 1, [&](Index b, Index) {
+        const auto& place = used[static_cast<std::size_t>(b)];
+        f(*block_data_[static_cast<std::size_t>(b)], place);
+      });
+    };
+    for_each_block([&](Block& block, const Place& place) { set_nearest(block, place); });
+    for_each_block([&](Block& block, const Place& place) { copy_borders(block, place); });
+    for_each_block([&](Block& block, const Place& place) { set_crossed(block, place); });
+    for_each_block([&](Block& block, const Place& place) { set_sums(block, place); });
+    for_each_block([&](Block& block, const Place& place) { copy_borders(block, place); });
   }
 
   double spacing_of_cell() const noexcept { return cell_ * cells_per_spacing; }
 
-  StoredValues node_at(const Vector3<double>& x) const noexcept {
-    NodeValues node = NodeValues::Zero();
-    node[0] = node[4] = 2 * reach();
-    WallSample sample;
-    const bool near = sample_directly(x, sample);
-    const double distance = near ? plane_.distance_for(sample.share) : 0;
-    // close to the reach share and slope tend to zero, and their quotients to rounding: the nearest point tells better
-    if (near && distance < 0.9 * reach()) {
-      node[0] = distance;
-      node.segment<3>(1) = sample.gradient / plane_.slope(distance);
-      node[4] = sample.distance;
-      set_moment(node, sample.moment / plane_.slope(distance));
-    } else if (const auto nearest = surface_->closest_point(x, 2 * reach())) {
-      node[0] = node[4] = nearest->distance;
-      if (nearest->distance > 0) {
-        const Vector3<double> toward = (nearest->point - x) / nearest->distance;
-        node.segment<3>(1) = toward;
-        set_moment(node, nearest->distance * toward * toward.transpose());
+  /// Of node or cell i, j, k of a block, where these may be fractions.
+  Vector3<double> position(const Place& place, double i, double j, double k) const noexcept {
+    return origin_ +
+           cell_ * Vector3<double>(block_cells * place[0] + i, block_cells * place[1] + j, block_cells * place[2] + k);
+  }
+
+  /// The block there; none outside of the table and far from the surface.
+  const Block* block_at(const Place& place) const noexcept {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (place[axis] < 0 || place[axis] >= blocks_[axis]) {
+        return nullptr;
       }
     }
-    return node.cast<float>();
+    const std::int32_t block = block_of_[block_number(place[0], place[1], place[2])];
+    return block < 0 ? nullptr : block_data_[static_cast<std::size_t>(block)].get();
   }
 
-  static void set_moment(NodeValues& node, const Eigen::Matrix3d& moment) noexcept {
-    node.tail<6>() << moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2);
+  /// The other block that computes a node on the border of this one.
+  const Block* owner(const Place& place, int i, int j, int k) const noexcept {
+    const Place next{place[0] + i / block_cells, place[1] + j / block_cells, place[2] + k / block_cells};
+    return next == place ? nullptr : block_at(next);
   }
 
-  void fill(Block& block, const Vector3<double>& corner) const noexcept {
+  template <class Function>
+  static void for_each_node(Function&& f) {
     for (int k = 0; k < block_nodes; ++k) {
       for (int j = 0; j < block_nodes; ++j) {
         for (int i = 0; i < block_nodes; ++i) {
-          block.value[node_number(i, j, k)] = node_at(corner + cell_ * Vector3<double>(i, j, k));
+          f(i, j, k);
         }
       }
     }
+  }
+
+  void copy_borders(Block& block, const Place& place) const noexcept {
+    for_each_node([&](int i, int j, int k) {
+      // its own borders may be written meanwhile, but not this node, which is not at its upper ones
+      if (const Block* from = owner(place, i, j, k)) {
+        block.value[node_number(i, j, k)] = from->value[node_number(i % block_cells, j % block_cells, k % block_cells)];
+      }
+    });
+  }
+
+  /// The nearest wall, taken for a plane.
+  void set_nearest(Block& block, const Place& place) const noexcept {
+    double limit = 2 * reach();
+    for_each_node([&](int i, int j, int k) {
+      if (owner(place, i, j, k) != nullptr) {
+        limit = 2 * reach();
+        return;
+      }
+      const Vector3<double> x = position(place, i, j, k);
+      NodeValues node = NodeValues::Zero();
+      node[0] = node[4] = 2 * reach();
+      // the distance changes by a cell at most from one node to the next in the row, which saves most of the search
+      const auto nearest = surface_->closest_point(x, i == 0 ? 2 * reach() : limit);
+      limit = 2 * reach();
+      if (nearest) {
+        limit = std::min(limit, nearest->distance + 1.001 * cell_);
+        node[0] = node[4] = nearest->distance;
+        if (nearest->distance > 0) {
+          const Vector3<double> toward = (nearest->point - x) / nearest->distance;
+          node.segment<3>(1) = toward;
+          set_moment(node, nearest->distance * toward * toward.transpose());
+        }
+      }
+      block.value[node_number(i, j, k)] = node.cast<float>();
+    });
+  }
+
+  void set_crossed(Block& block, const Place& place) const noexcept {
     const double half_diagonal = 0.5 * std::sqrt(3.0) * cell_;
     for (int k = 0; k < block_cells; ++k) {
       for (int j = 0; j < block_cells; ++j) {
@@ -288,13 +358,56 @@ class MeshWall {
                                                                 k + (corner_number >> 2))][4]);
           }
           if (static_cast<double>(nearest) < half_diagonal) {
-            const Vector3<double> center = corner + cell_ * Vector3<double>(i + 0.5, j + 0.5, k + 0.5);
-            block.crossed[static_cast<std::size_t>((k * block_cells + j) * block_cells + i)] =
-                surface_->closest_point(center, half_diagonal).has_value();
+            block.crossed[cell_number(i, j, k)] =
+                surface_->closest_point(position(place, i + 0.5, j + 0.5, k + 0.5), half_diagonal).has_value();
           }
         }
       }
     }
+  }
+
+  /// Whether look_up reads a node that this block computes: if one of the cells around it has an answer.
+  bool is_read(const Place& place, int i, int j, int k) const noexcept {
+    for (int corner = 0; corner < 8; ++corner) {
+      // one block further, so that what is below it counts from 0 as well
+      const int ci = i - (corner & 1) + block_cells, cj = j - ((corner >> 1) & 1) + block_cells,
+                ck = k - (corner >> 2) + block_cells;
+      const Block* block =
+          block_at({place[0] + ci / block_cells - 1, place[1] + cj / block_cells - 1, place[2] + ck / block_cells - 1});
+      if (block != nullptr && !block->crossed[cell_number(ci % block_cells, cj % block_cells, ck % block_cells)]) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// The sums over directions where there is something to sum.
+  void set_sums(Block& block, const Place& place) const noexcept {
+    for_each_node([&](int i, int j, int k) {
+      StoredValues& stored = block.value[node_number(i, j, k)];
+      if (!(static_cast<double>(stored[4]) < reach()) || owner(place, i, j, k) != nullptr || !is_read(place, i, j, k)) {
+        return;
+      }
+      WallSample sample;
+      if (!add_up_directions(position(place, i, j, k), sample)) {
+        return;
+      }
+      const double distance = plane_.distance_for(sample.share);
+      // close to the reach share and slope tend to zero, and their quotients to rounding: the nearest point tells
+      // better
+      if (distance < 0.9 * reach()) {
+        NodeValues node;
+        node[0] = distance;
+        node.segment<3>(1) = sample.gradient / plane_.slope(distance);
+        node[4] = static_cast<double>(stored[4]);
+        set_moment(node, sample.moment / plane_.slope(distance));
+        stored = node.cast<float>();
+      }
+    });
+  }
+
+  static void set_moment(NodeValues& node, const Eigen::Matrix3d& moment) noexcept {
+    node.tail<6>() << moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2);
   }
 
   const BoundingVolumeHierarchy* surface_ = nullptr;

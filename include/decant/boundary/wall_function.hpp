@@ -71,6 +71,20 @@ class WallFunction {
     return amplitude_ * power_ / reach_ * std::pow(left(std::abs(a)), power_ - 1);
   }
 
+  /// What the sum over directions needs at one distance.
+  struct Terms {
+    double share;                ///< [-]
+    double slope;                ///< [1/m]
+    double radius_times_weight;  ///< [1/m^2]
+  };
+
+  /// share, slope and radius_times_weight at a >= 0 at the price of one of them: they are powers of one number.
+  Terms terms(double a) const noexcept {
+    const double l = left(a);
+    const double power = amplitude_ * std::pow(l, power_ - 2);
+    return {power * l * l, power_ / reach_ * power * l, power_ * (power_ - 1) / (reach_ * reach_) * power / (2 * pi)};
+  }
+
   /// The distance at which a plane adds `share`, the inverse of share(a); -R .. R [m].
   double distance_for(double share) const noexcept {
     const double front = share > amplitude_ ? std::max(2 * amplitude_ - share, 0.0) : std::max(share, 0.0);
