@@ -83,6 +83,16 @@ int main(int count, char** values) {
                   result.posterior.pooled_over_pixels(), result.prior.mean_over_frames(),
                   result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
                   static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
+      for (const auto& [parameter, value] : result.parameters) {
+        std::printf("  %s %.3g", parameter.c_str(), value);
+      }
+      if (result.initial_ml) {
+        std::printf("  at first %.0f ml (90 %%: %.0f .. %.0f ml)%s", result.initial_ml->mean, result.initial_ml->low,
+                    result.initial_ml->high, result.initial_ml->at_end ? ", or beyond what was asked about" : "");
+      }
+      if (!result.parameters.empty() || result.initial_ml) {
+        std::putchar('\n');
+      }
       std::fflush(stdout);
       results.push_back({name, std::move(result)});
     }

@@ -60,17 +60,17 @@ inline std::vector<decant::UncertainParameter<TrackingModel>> uncertain_paramete
   using Gravity = decant::Gravity<float>;
   // the first parameter starts from what the recording says, the second one adds to it
   return {
-      {"pull along x [m/s^2]", 0.5,
+      {"pull_x_m_s2", 0.5,
        [=](TrackingModel& model, double pull) {
          model.force<Gravity>().acceleration = gravity + static_cast<float>(pull) * x;
        }},
-      {"pull along y [m/s^2]", 0.5,
+      {"pull_y_m_s2", 0.5,
        [=](TrackingModel& model, double pull) { model.force<Gravity>().acceleration += static_cast<float>(pull) * y; }},
-      {"drag [1/s]", 1.2,
+      {"drag_1_s", 1.2,
        [](TrackingModel& model, double drag) {
          model.force<decant::LinearDrag<float>>().rate = static_cast<float>(std::max(0.0, drag));
        }},
-      {"viscosity [decades]", 1, [=](TrackingModel& model, double decades) {
+      {"viscosity_decades", 1, [=](TrackingModel& model, double decades) {
          // half a decade per deviation and step of 1e-5 m^2/s, below which particles of some millimetres feel none
          const double thickened = 1e-5 * (std::pow(10.0, std::max(0.0, decades)) - 1);
          model.force<decant::Viscosity<float>>().kinematic_viscosity = nu + static_cast<float>(thickened);

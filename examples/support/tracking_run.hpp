@@ -210,7 +210,7 @@ void say_estimates(const decant::FixedLagTracker<TrackerType>& follower, const s
   for (std::size_t k = 0; k < follower.parameters().size(); ++k) {
     result.parameters.emplace_back(follower.parameters()[k].name, follower.value(k));
   }
-  result.parameters.emplace_back("delay of poses [s]", follower.pose_delay());
+  result.parameters.emplace_back("pose_delay_s", follower.pose_delay());
 }
 /// Hypotheses of the initial amount, in any order.
 template <class TrackerType>

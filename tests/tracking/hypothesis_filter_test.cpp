@@ -32,6 +32,7 @@ DustTracker<CorrectorType> falling_with(double gravity) {
 /// Hypotheses that the dust falls with 0, 1, 2, 3 and 4 m/s^2. @param frames of what really falls with 2 m/s^2.
 template <class CorrectorType>
 HypothesisFilter<DustTracker<CorrectorType>> after(int frames, HypothesisFilterSettings settings = {}) {
+  settings.cell_deviation = 0.5;
   HypothesisFilter<DustTracker<CorrectorType>> filter(settings);
   for (int gravity = 0; gravity <= 4; ++gravity) {
     filter.add(falling_with<CorrectorType>(-gravity));

@@ -169,6 +169,8 @@ class BoundingVolumeHierarchy {
   FloatSegment to_float(const Vector3<double>& from, const Vector3<double>& to) const noexcept;
   static unsigned overlapping(const Node& node, const FloatSegment& segment) noexcept;
   static detail::Float4 distances_squared(const Node& node, const detail::Float4 (&x)[3]) noexcept;
+  static void push_farthest_first(const Node& node, unsigned open, const detail::Float4& far,
+                                  std::array<std::uint32_t, stack_size>& stack, int& top) noexcept;
   // Calls visit(triangle) for every triangle whose box the segment may meet, until it returns true.
   template <class Visit>
   bool walk(const Vector3<double>& from, const Vector3<double>& to, Visit&& visit) const noexcept;
@@ -426,6 +428,28 @@ inline auto BoundingVolumeHierarchy::closest_point(const Vector3<double>& x, dou
   return Closest{point, std::sqrt(best), nearest->unit_normal(), nearest->index};
 }
 
+// So that the nearest is looked at next. @param open a bit for each child that goes onto the stack. @param far how far
+// they are, in any measure.
+inline void BoundingVolumeHierarchy::push_farthest_first(const Node& node, unsigned open, const detail::Float4& far,
+                                                         std::array<std::uint32_t, stack_size>& stack,
+                                                         int& top) noexcept {
+  std::array<float, 4> keys;
+  const int bottom = top;
+  for (int k = 0; open != 0; ++k, open >>= 1) {
+    if ((open & 1U) == 0) {
+      continue;
+    }
+    int place = top++;
+    while (place > bottom && keys[static_cast<std::size_t>(place - 1 - bottom)] < far[k]) {
+      keys[static_cast<std::size_t>(place - bottom)] = keys[static_cast<std::size_t>(place - 1 - bottom)];
+      stack[static_cast<std::size_t>(place)] = stack[static_cast<std::size_t>(place - 1)];
+      --place;
+    }
+    keys[static_cast<std::size_t>(place - bottom)] = far[k];
+    stack[static_cast<std::size_t>(place)] = node.child[k];
+  }
+}
+
 template <class Function>
 void BoundingVolumeHierarchy::for_each_triangle_near(const Vector3<double>& x, double max_distance,
                                                      Function&& f) const {
@@ -453,23 +477,7 @@ void BoundingVolumeHierarchy::for_each_triangle_near(const Vector3<double>& x, d
     }
     const Node& node = nodes_[child];
     const Float4 distance_squared = distances_squared(node, from);
-    unsigned open = detail::lanes(distance_squared <= limit);
-    // farthest first onto the stack, so that the nearest is looked at next
-    std::array<float, 4> keys;
-    const int bottom = top;
-    for (int k = 0; open != 0; ++k, open >>= 1) {
-      if ((open & 1U) == 0) {
-        continue;
-      }
-      int place = top++;
-      while (place > bottom && keys[static_cast<std::size_t>(place - 1 - bottom)] < distance_squared[k]) {
-        keys[static_cast<std::size_t>(place - bottom)] = keys[static_cast<std::size_t>(place - 1 - bottom)];
-        stack[static_cast<std::size_t>(place)] = stack[static_cast<std::size_t>(place - 1)];
-        --place;
-      }
-      keys[static_cast<std::size_t>(place - bottom)] = distance_squared[k];
-      stack[static_cast<std::size_t>(place)] = node.child[k];
-    }
+    push_farthest_first(node, detail::lanes(distance_squared <= limit), distance_squared, stack, top);
   }
 }
 
@@ -572,24 +580,9 @@ bool BoundingVolumeHierarchy::walk(const Vector3<double>& from, const Vector3<do
       }
       continue;
     }
-    // farthest along the segment first onto the stack, so that the nearest is looked at next
     const detail::Float4 along = node.center[0] * segment.direction[0] + node.center[1] * segment.direction[1] +
                                  node.center[2] * segment.direction[2];
-    std::array<float, 4> keys;
-    const int bottom = top;
-    for (int k = 0; open != 0; ++k, open >>= 1) {
-      if ((open & 1U) == 0) {
-        continue;
-      }
-      int place = top++;
-      while (place > bottom && keys[static_cast<std::size_t>(place - 1 - bottom)] < along[k]) {
-        keys[static_cast<std::size_t>(place - bottom)] = keys[static_cast<std::size_t>(place - 1 - bottom)];
-        stack[static_cast<std::size_t>(place)] = stack[static_cast<std::size_t>(place - 1)];
-        --place;
-      }
-      keys[static_cast<std::size_t>(place - bottom)] = along[k];
-      stack[static_cast<std::size_t>(place)] = node.child[k];
-    }
+    push_farthest_first(node, open, along, stack, top);
   }
   return false;
 }

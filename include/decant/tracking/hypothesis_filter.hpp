@@ -22,9 +22,10 @@ namespace decant {
 /// Settings of HypothesisFilter.
 struct HypothesisFilterSettings {
   int cell_px = 20;  ///< see SilhouetteCells, >= 1
-  /// Standard deviation of a cell's share of liquid, if the hypothesis is right, > 0. It is larger than that of a
-  /// single cell and frame (0.1), since neighbouring cells and frames err together.
-  double cell_deviation = 0.5;
+  /// Standard deviation of a cell's share of liquid, if the hypothesis is right, > 0. By itself a cell in a frame is
+  /// off by 0.1 to 0.2; but a jet that is a little off is so for some ten frames and across some cells, which count as
+  /// one.
+  double cell_deviation = 1;
   double least_probability = 1e-6;  ///< hypotheses below are given up, in [0, 1); 0: none
   Threads threads{};                ///< over which hypotheses are shared out
 };
