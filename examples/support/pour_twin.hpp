@@ -351,7 +351,10 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
 
   RayOcclusion<PinholeCamera> sight(PosedCamera<PinholeCamera>(camera, camera_from_world));
   sight.add_bodies(reality.bodies(), 0);
-  Silhouette<DiscSplat<float>> drawing(DiscSplat<float>(0.62 * twin.spacing), GapClosing(4));
+  // a film is wet between the particles that stand for it
+  const double depth = (camera_from_world * Vector3<double>::Zero()).z();
+  const int film_px = static_cast<int>(std::lround(1.25 * camera.fx() * twin.spacing / depth));
+  Silhouette<DiscSplat<float>> drawing(DiscSplat<float>(0.62 * twin.spacing), GapClosing(film_px));
   MaskNoise noise(twin.seed);
   Mask clean(camera.height(), camera.width());
   std::vector<std::uint8_t> unseen;
