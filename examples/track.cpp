@@ -68,7 +68,7 @@ int main(int count, char** values) {
     }
     const decant::Recording recording = decant::read_recording(folder);
     const example::TrackingModel model = example::model_of<example::TrackingParts>(recording, options);
-    std::printf("%s: %zu frames, %td particles of %.1f mm\n%-12s %6s %6s %6s %6s %8s\n", recording.name.c_str(),
+    std::printf("%s: %zu frames, %td particles of %.1f mm\n%-17s %6s %6s %6s %6s %8s\n", recording.name.c_str(),
                 recording.frames, model.fluid().size(), spacing_mm, "", "IoU", "pooled", "prior", "+0.5 s", "frames/s");
     for (const std::string& name : names) {
       decant::Progress progress(name, static_cast<double>(recording.frames));
@@ -79,10 +79,11 @@ int main(int count, char** values) {
       failed = failed || result.status != "ok";
       const double seconds =
           1e-3 * (result.physics_ms + result.drawing_ms + result.correction_ms + result.relaxation_ms);
-      std::printf("%-12s %6.3f %6.3f %6.3f %6.3f %8.1f  %s\n", name.c_str(), result.posterior.mean_over_frames(),
+      const double ahead = result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan("");
+      std::printf("%-17s %6.3f %6.3f %6.3f %6s %8.1f  %s\n", name.c_str(), result.posterior.mean_over_frames(),
                   result.posterior.pooled_over_pixels(), result.prior.mean_over_frames(),
-                  result.forecasts.size() > 1 ? result.forecasts[1].mean_over_frames() : std::nan(""),
-                  static_cast<double>(result.frames) / seconds, result.status == "ok" ? "" : result.status.c_str());
+                  example::detail::figure(ahead, 3).c_str(), static_cast<double>(result.frames) / seconds,
+                  result.status == "ok" ? "" : result.status.c_str());
       for (const auto& [parameter, value] : result.parameters) {
         std::printf("  %s %.3g", parameter.c_str(), value);
       }

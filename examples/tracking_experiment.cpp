@@ -63,10 +63,13 @@ Plan plan_of(const std::string& set, std::vector<std::string> methods, const std
     return !only.empty() && std::find(only.begin(), only.end(), each.name) == only.end();
   });
   if (methods.empty()) {
-    methods = set == "pours"          ? example::tracking_method_names()
-              : set == "wrong_amount" ? std::vector<std::string>{"open_loop", "default", "default_amounts"}
-                                      : std::vector<std::string>{"open_loop", "default"};
-    std::erase(methods, set == "pours" ? "default_amounts" : "");  // the paper's pours are told the amount
+    methods = {"open_loop", "default"};
+    if (set == "pours") {
+      methods = example::tracking_method_names();
+      std::erase(methods, "default_amounts");  // the paper's pours are told the amount
+    } else if (set == "wrong_amount") {
+      methods.push_back("default_amounts");
+    }
   }
   if (set == "harmless" || set == "sweep") {
     methods.insert(methods.begin(), "open_loop");  // which the others are compared with

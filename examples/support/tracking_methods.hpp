@@ -71,7 +71,7 @@ inline std::vector<decant::UncertainParameter<TrackingModel>> uncertain_paramete
          model.force<decant::LinearDrag<float>>().rate = static_cast<float>(std::max(0.0, drag));
        }},
       {"viscosity_decades", 1, [=](TrackingModel& model, double decades) {
-         // half a decade per deviation and step of 1e-5 m^2/s, below which particles of some millimetres feel none
+         // from 1e-5 m^2/s on: liquid of particles of some millimetres does not feel less
          const double thickened = 1e-5 * (std::pow(10.0, std::max(0.0, decades)) - 1);
          model.force<decant::Viscosity<float>>().kinematic_viscosity = nu + static_cast<float>(thickened);
        }}};
@@ -83,12 +83,11 @@ inline TrackingResult track_adapting(const decant::Recording& recording, const T
                                      const std::function<void(std::size_t)>& progress) {
   decant::FixedLagSettings settings;
   settings.threads = {options.threads};
-  TrackingResult result =
-      track_recording(recording,
-                      decant::FixedLagTracker(tracker_for(recording, model, decant::SilhouetteCorrector<>(), options),
-                                              uncertain_parameters(recording), settings),
-                      options, truth_masks, progress);
-  return result;
+  return track_recording(
+      recording,
+      decant::FixedLagTracker(tracker_for(recording, model, decant::SilhouetteCorrector<>(), options),
+                              uncertain_parameters(recording), settings),
+      options, truth_masks, progress);
 }
 
 /// The default corrector from each of several initial amounts, around what the recording says; the most probable one
@@ -100,13 +99,15 @@ inline TrackingResult track_amounts(const decant::Recording& recording, const Tr
   decant::HypothesisFilterSettings settings;
   settings.threads = {options.threads};
   decant::HypothesisFilter<decant::Tracker<TrackingModel, decant::SilhouetteCorrector<>>> filter(settings);
+  TrackingModel empty = model;  // bodies are slow to add, and can be shared
+  empty.remove_particles_if([](decant::Index) { return true; });
   for (int k = -4; k <= 4; ++k) {
-    TrackingOptions other = options;
-    other.initial_amount_factor = told * std::pow(ratio, k);
+    TrackingModel other = k == 0 ? model : empty;
+    if (k != 0) {
+      fill_as_recorded(recording, told * std::pow(ratio, k), other);
+    }
     const double off = k * std::log(ratio) / deviation;
-    filter.add(tracker_for(recording, k == 0 ? model : model_of<TrackingParts>(recording, other),
-                           decant::SilhouetteCorrector<>(), options),
-               -0.5 * off * off);
+    filter.add(tracker_for(recording, other, decant::SilhouetteCorrector<>(), options), -0.5 * off * off);
   }
   return track_recording(recording, std::move(filter), options, truth_masks, progress);
 }

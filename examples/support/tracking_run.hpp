@@ -115,6 +115,23 @@ struct TrackingParts : decant::DefaultParts<float> {
 };
 using TrackingModel = decant::Simulator<TrackingParts>;
 
+/// The initial amount of liquid that a recording says, times a factor, at most a full container. Throws
+/// std::invalid_argument if the recording does not know it.
+template <class Model>
+void fill_as_recorded(const decant::Recording& recording, double factor, Model& model) {
+  if (!recording.liquid.initial) {
+    return;
+  }
+  using decant::FillAmount;
+  const auto& initial = *recording.liquid.initial;
+  decant::expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
+  const FillAmount amount = initial.fill_fraction ? FillAmount::fraction(std::min(factor * *initial.fill_fraction, 1.0))
+                                                  : FillAmount::volume(factor * *initial.volume);
+  if (amount.value > 0) {
+    decant::fill(model, static_cast<decant::BodyId>(initial.body), amount);
+  }
+}
+
 /// The model as a recording says that it starts. Throws std::invalid_argument if the amount of liquid is not known.
 template <class Parts>
 decant::Simulator<Parts> model_of(const decant::Recording& recording, const TrackingOptions& options) {
@@ -131,19 +148,7 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
       model.watch_contents(id);
     }
   }
-  if (recording.liquid.initial) {
-    const auto& initial = *recording.liquid.initial;
-    expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
-    FillAmount amount =
-        initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction) : FillAmount::volume(*initial.volume);
-    amount.value *= options.initial_amount_factor;
-    if (initial.fill_fraction) {
-      amount.value = std::min(amount.value, 1.0);
-    }
-    if (amount.value > 0) {
-      decant::fill(model, static_cast<BodyId>(initial.body), amount);
-    }
-  }
+  fill_as_recorded(recording, options.initial_amount_factor, model);
   if (recording.liquid.inlet) {
     model.add_inlet(*recording.liquid.inlet, static_cast<Origin>(recording.bodies.size()));
   }
@@ -161,6 +166,7 @@ decant::PoseTrack shifted(const decant::PoseTrack& motion, double by, const Mode
   }
   return decant::PoseTrack(std::move(samples));
 }
+
 /// What follows a recording, as forecasts and scores see it: a tracker, by itself or the one that is in use.
 template <class Model, class CorrectorType>
 decant::Tracker<Model, CorrectorType>& tracker_of(decant::Tracker<Model, CorrectorType>& tracker) {

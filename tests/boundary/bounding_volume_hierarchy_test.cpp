@@ -14,6 +14,7 @@ namespace {
 using decant::BoundingVolumeHierarchy;
 using decant::TriangleMesh;
 using decant_test::bumpy_ball;
+using decant_test::cube;
 using decant_test::random_point;
 using Point = decant::Vector3<double>;
 
@@ -48,16 +49,6 @@ TriangleMesh moved(TriangleMesh mesh, double scale, const Point& by) {
   for (Point& vertex : mesh.vertices) {
     vertex = scale * vertex + by;
   }
-  return mesh;
-}
-
-TriangleMesh cube() {
-  TriangleMesh mesh;
-  for (int k = 0; k < 8; ++k) {
-    mesh.vertices.emplace_back(k & 1, (k >> 1) & 1, k >> 2);
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
   return mesh;
 }
 

@@ -102,4 +102,15 @@ inline decant::TriangleMesh some_turned(decant::TriangleMesh mesh, unsigned seed
   return mesh;
 }
 
+/// The unit cube.
+inline decant::TriangleMesh cube() {
+  decant::TriangleMesh mesh;
+  for (int k = 0; k < 8; ++k) {
+    mesh.vertices.emplace_back(k & 1, (k >> 1) & 1, k >> 2);
+  }
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
 }  // namespace decant_test

@@ -20,6 +20,7 @@ using decant::BoundingVolumeHierarchy;
 using decant::RayFan;
 using decant::TriangleMesh;
 using decant_test::bumpy_ball;
+using decant_test::cube;
 using decant_test::random_point;
 using Point = decant::Vector3<double>;
 
@@ -53,16 +54,6 @@ RayFan<32> crystal_fan() {
     directions[count++] = Point(std::cos(0.3 + turn), std::sin(0.3 + turn), 0);
   }
   return RayFan<32>(directions);
-}
-
-TriangleMesh cube() {
-  TriangleMesh mesh;
-  for (int k = 0; k < 8; ++k) {
-    mesh.vertices.emplace_back(k & 1, (k >> 1) & 1, k >> 2);
-  }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  return mesh;
 }
 
 // Ray by ray; returns how many hit. `scale` is that of the coordinates, which hits are known relative to.

@@ -89,9 +89,9 @@ TEST_CASE("fixed lag: a model that is right is left alone, and is tracked as wit
   CHECK(follower.tracker().model().dust.position == plain.model().dust.position);
 }
 
-TEST_CASE("fixed lag: poses that come late are found out, and caught up with") {
-  // the dust is carried to the right and turned, and its poses are 0.08 s late
-  const double delay = 0.08;
+TEST_CASE("fixed lag: poses that come late or early are found out, and caught up with") {
+  // the dust is carried to the right and turned, and its poses are 0.08 s late, or early
+  const double delay = GENERATE(0.08, -0.08);
   const auto real_pose = [](double t) {
     return Pose{Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * t, Vector3<double>::UnitY())), {-0.06 + 0.15 * t, 0, 0}};
   };
@@ -123,9 +123,38 @@ TEST_CASE("fixed lag: poses that come late are found out, and caught up with") {
     caught_up = report.prior.iou();
   }
   CHECK(follower.pose_delay() == Approx(delay).margin(0.01));
-  // 12 mm of the block's 40 lag behind at first
+  // what cannot be used is refused, also where poses are moved in time
+  Pose nowhere;
+  nowhere.translation.x() = std::nan("");
+  const std::vector<TrackedPose> lost{{0, nowhere}};
+  CHECK(follower.track({0.5, lost, {}}).status == FrameStatus::Late);
+  CHECK(follower.track({20 / 30.0, lost, {}}).status == FrameStatus::Late);
+  CHECK(follower.track({21 / 30.0, lost, {}}).status == FrameStatus::BadInput);
+  CHECK(follower.track({std::nan(""), lost, {}}).status == FrameStatus::Gap);
+  CHECK(follower.track({21 / 30.0, {}, {}}).advanced());
+  // at first, 12 mm of the block's 40 lag behind or are ahead
   CHECK(late < 0.65);
   CHECK(caught_up > 0.9);
+}
+
+TEST_CASE("fixed lag: a camera that moves is where the frame says, also when frames are run through again") {
+  FixedLagTracker<Tracker<FallingDust, TransportCorrector<double>>> follower(dust_tracker<TransportCorrector<double>>(),
+                                                                             {more_gravity}, without_delay());
+  FallingDust reality = high_dust();
+  reality.gravity = -2;
+  for (int frame = 1; frame <= 10; ++frame) {
+    reality.step(1 / 30.0);
+    Pose camera_from_world = decant_test::before_the_block();
+    camera_from_world.translation.x() = 0.006 * frame;  // 6 px a frame, to the left
+    decant_test::Eye<double> eye(camera_from_world);
+    eye.observe(reality.dust);
+    const std::vector<CameraMask> masks{{0, eye.observed}};
+    const std::vector<CameraPose> cameras{{0, camera_from_world}};
+    REQUIRE(follower.track({frame / 30.0, {}, masks, cameras}).status == FrameStatus::Ok);
+  }
+  CHECK(follower.value(0) == Approx(1).margin(0.2));
+  const Vector3<double> center = follower.tracker().model().dust.position.rowwise().mean();
+  CHECK(std::abs(center.x()) < 0.002);
 }
 
 TEST_CASE("fixed lag: frames that are refused are not remembered, and frames without masks teach nothing") {

@@ -114,7 +114,8 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
   filter.add(falling_with<OpenLoop<double>>(-1), 5);
   filter.add(falling_with<OpenLoop<double>>(-2));
   filter.tracker(0).model().broken = true;
-  CHECK(filter.track({0.1, {}, {}}).status == FrameStatus::ModelFailed);  // of the one that was the best
+  CHECK(filter.track({0.1, {}, {}}).status == FrameStatus::Uncorrected);  // of the one that is left
+  CHECK(filter.report(0).status == FrameStatus::ModelFailed);
   CHECK(filter.given_up(0));
   CHECK(filter.best() == 1);
   CHECK(filter.track({0.2, {}, {}}).advanced());

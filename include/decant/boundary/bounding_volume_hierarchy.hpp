@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -171,7 +172,11 @@ class BoundingVolumeHierarchy {
   static detail::Float4 distances_squared(const Node& node, const detail::Float4 (&x)[3]) noexcept;
   static void push_farthest_first(const Node& node, unsigned open, const detail::Float4& far,
                                   std::array<std::uint32_t, stack_size>& stack, int& top) noexcept;
-  // Calls visit(triangle) for every triangle whose box the segment may meet, until it returns true.
+  // From the root: into the children of a node whose bits open_of(node) has, the least far_of(node) first, and to
+  // visit(triangle) until it returns true.
+  template <class Open, class Far, class Visit>
+  bool descend(Open&& open_of, Far&& far_of, Visit&& visit) const;
+  // Calls visit(triangle, segment) for every triangle whose box the segment may meet, until it returns true.
   template <class Visit>
   bool walk(const Vector3<double>& from, const Vector3<double>& to, Visit&& visit) const noexcept;
 
@@ -450,6 +455,37 @@ inline void BoundingVolumeHierarchy::push_farthest_first(const Node& node, unsig
   }
 }
 
+template <class Open, class Far, class Visit>
+bool BoundingVolumeHierarchy::descend(Open&& open_of, Far&& far_of, Visit&& visit) const {
+  std::array<std::uint32_t, stack_size> stack;
+  int top = 0;
+  stack[static_cast<std::size_t>(top++)] = 0;
+  while (top > 0) {
+    const std::uint32_t child = stack[static_cast<std::size_t>(--top)];
+    if ((child & leaf_flag) != 0) {
+      const std::uint32_t first = child & 0x0FFFFFFFU;
+      const std::uint32_t last = first + ((child >> 28) & 7U);
+      for (std::uint32_t t = first; t <= last; ++t) {
+        if (visit(leaf_triangles_[t])) {
+          return true;
+        }
+      }
+      continue;
+    }
+    const Node& node = nodes_[child];
+    const unsigned open = open_of(node);
+    if (open == 0) {
+      continue;
+    }
+    if ((open & (open - 1)) == 0) {  // one: nothing to sort
+      stack[static_cast<std::size_t>(top++)] = node.child[std::countr_zero(open)];
+      continue;
+    }
+    push_farthest_first(node, open, far_of(node), stack, top);
+  }
+  return false;
+}
+
 template <class Function>
 void BoundingVolumeHierarchy::for_each_triangle_near(const Vector3<double>& x, double max_distance,
                                                      Function&& f) const {
@@ -462,23 +498,17 @@ void BoundingVolumeHierarchy::for_each_triangle_near(const Vector3<double>& x, d
                           detail::broadcast(static_cast<float>(local[1])),
                           detail::broadcast(static_cast<float>(local[2]))};
   const Float4 limit = detail::broadcast(static_cast<float>(std::min(max_distance * max_distance, 1e29) * room));
-  std::array<std::uint32_t, stack_size> stack;
-  int top = 0;
-  stack[static_cast<std::size_t>(top++)] = 0;
-  while (top > 0) {
-    const std::uint32_t child = stack[static_cast<std::size_t>(--top)];
-    if ((child & leaf_flag) != 0) {
-      const std::uint32_t first = child & 0x0FFFFFFFU;
-      const std::uint32_t last = first + ((child >> 28) & 7U);
-      for (std::uint32_t t = first; t <= last; ++t) {
-        f(std::as_const(leaf_triangles_[t]));
-      }
-      continue;
-    }
-    const Node& node = nodes_[child];
-    const Float4 distance_squared = distances_squared(node, from);
-    push_farthest_first(node, detail::lanes(distance_squared <= limit), distance_squared, stack, top);
-  }
+  Float4 distance_squared{};
+  descend(
+      [&](const Node& node) {
+        distance_squared = distances_squared(node, from);
+        return detail::lanes(distance_squared <= limit);
+      },
+      [&](const Node&) { return distance_squared; },
+      [&](const detail::TreeTriangle& triangle) {
+        f(triangle);
+        return false;
+      });
 }
 
 // Cuts a long segment down to where the mesh is, so that what follows has coordinates of the mesh's size.
@@ -555,36 +585,12 @@ template <class Visit>
 bool BoundingVolumeHierarchy::walk(const Vector3<double>& from, const Vector3<double>& to,
                                    Visit&& visit) const noexcept {
   FloatSegment segment = to_float(from, to);
-  std::array<std::uint32_t, stack_size> stack;
-  int top = 0;
-  stack[static_cast<std::size_t>(top++)] = 0;
-  while (top > 0) {
-    const std::uint32_t child = stack[static_cast<std::size_t>(--top)];
-    if ((child & leaf_flag) != 0) {
-      const std::uint32_t first = child & 0x0FFFFFFFU;
-      const std::uint32_t last = first + ((child >> 28) & 7U);
-      for (std::uint32_t t = first; t <= last; ++t) {
-        if (visit(leaf_triangles_[t], segment)) {
-          return true;
-        }
-      }
-      continue;
-    }
-    const Node& node = nodes_[child];
-    unsigned open = overlapping(node, segment);
-    if ((open & (open - 1)) == 0) {  // none or one
-      for (int k = 0; open != 0; ++k, open >>= 1) {
-        if ((open & 1U) != 0) {
-          stack[static_cast<std::size_t>(top++)] = node.child[k];
-        }
-      }
-      continue;
-    }
-    const detail::Float4 along = node.center[0] * segment.direction[0] + node.center[1] * segment.direction[1] +
-                                 node.center[2] * segment.direction[2];
-    push_farthest_first(node, open, along, stack, top);
-  }
-  return false;
+  return descend([&](const Node& node) { return overlapping(node, segment); },
+                 [&](const Node& node) {  // along the segment
+                   return node.center[0] * segment.direction[0] + node.center[1] * segment.direction[1] +
+                          node.center[2] * segment.direction[2];
+                 },
+                 [&](const detail::TreeTriangle& triangle) { return visit(triangle, segment); });
 }
 
 inline auto BoundingVolumeHierarchy::first_hit(const Vector3<double>& origin,

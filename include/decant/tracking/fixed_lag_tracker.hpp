@@ -92,9 +92,12 @@ class FixedLagTracker {
 
   /// As Tracker::track; a frame with which a lag ends takes as long as all simulations of it.
   [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
-    Seen seen{frame.time, {frame.poses.begin(), frame.poses.end()}, {}};
+    if (tracker_.check(frame) != FrameStatus::Ok) {
+      return tracker_.track(frame);
+    }
+    Seen seen{frame.time, {frame.poses.begin(), frame.poses.end()}, {frame.cameras.begin(), frame.cameras.end()}, {}};
     for (const CameraMask& mask : frame.masks) {
-      seen.masks.push_back({mask.camera, Mask(mask.mask)});
+      seen.masks.push_back({mask.camera, Mask(mask.mask), {}});
     }
     seen_.push_back(std::move(seen));
     const FrameReport report = show(tracker_, seen_.back(), state_, true);
@@ -102,20 +105,20 @@ class FixedLagTracker {
       seen_.pop_back();
       return report;
     }
-    seen_.back().believed = report.status == FrameStatus::Ok;
-    if (static_cast<int>(seen_.size()) - first_ == settings_.lag) {
+    for (SeenMask& mask : seen_.back().masks) {
+      if (tracker_.believes(mask.camera)) {
+        mask.shares = blurred(cells_.shares(tracker_.observed(mask.camera)));
+      }
+    }
+    if (seen_.size() - first_ == static_cast<std::size_t>(settings_.lag)) {
       adapt();
       past_ = tracker_;
       // of what is past only poses are still asked for, of delayed bodies
-      first_ = static_cast<int>(seen_.size());
       for (Seen& each : seen_) {
         each.masks.clear();
       }
-      const int kept = most_delay_frames;
-      if (first_ > kept) {
-        seen_.erase(seen_.begin(), seen_.begin() + (first_ - kept));
-        first_ = kept;
-      }
+      seen_.erase(seen_.begin(), seen_.end() - static_cast<std::ptrdiff_t>(std::min(seen_.size(), kept_frames)));
+      first_ = seen_.size();
     }
     return report;
   }
@@ -133,14 +136,15 @@ class FixedLagTracker {
   struct SeenMask {
     std::size_t camera;
     Mask mask;
+    SilhouetteCells::Shares shares;  ///< of liquid, cleaned and blurred; empty if the mask was not believed
   };
   struct Seen {
     double time;
     std::vector<TrackedPose> poses;
+    std::vector<CameraPose> cameras;
     std::vector<SeenMask> masks;
-    bool believed = false;
   };
-  static constexpr int most_delay_frames = 15, frames_for_speed = 6;
+  static constexpr std::size_t kept_frames = 15, frames_for_speed = 6;
 
   double delay(const Eigen::VectorXd& state) const noexcept {
     return settings_.delay_deviation > 0 ? state[state.size() - 1] * settings_.delay_deviation : 0;
@@ -162,8 +166,7 @@ class FixedLagTracker {
     if (time <= last.time || samples.size() < 2) {
       return PoseTrack(std::move(samples)).at(time);
     }
-    const PoseTrack::Sample& before =
-        samples[samples.size() - std::min<std::size_t>(samples.size(), frames_for_speed + 1)];
+    const PoseTrack::Sample& before = samples[samples.size() - std::min(samples.size(), frames_for_speed + 1)];
     const double ahead = (time - last.time) / (last.time - before.time);
     const RigidVelocity moved = velocity_between(before.pose, last.pose, 1);
     const double angle = ahead * moved.angular.norm();
@@ -188,21 +191,22 @@ class FixedLagTracker {
         masks.push_back({mask.camera, mask.mask});
       }
     }
-    return tracker.track({seen.time, poses, masks});
+    return tracker.track({seen.time, poses, masks, seen.cameras});
   }
 
   /// Differences of shares of liquid, observed minus predicted, of all frames since the past state, uncorrected.
   Eigen::VectorXd residual(const Eigen::VectorXd& state) const noexcept {
     Tracker tracker = past_;
     std::vector<double> all;
-    for (std::size_t k = static_cast<std::size_t>(first_); k < seen_.size(); ++k) {
+    for (std::size_t k = first_; k < seen_.size(); ++k) {
       if (!show(tracker, seen_[k], state, false).advanced()) {
         return {};
       }
-      for (std::size_t m = 0; seen_[k].believed && m < seen_[k].masks.size(); ++m) {
-        const SilhouetteCells::Shares& seen = observed_[k - static_cast<std::size_t>(first_)][m];
-        const SilhouetteCells::Shares off = seen - blurred(cells_.shares(tracker.predicted(seen_[k].masks[m].camera)));
-        all.insert(all.end(), off.data(), off.data() + off.size());
+      for (const SeenMask& mask : seen_[k].masks) {
+        if (mask.shares.size() > 0) {
+          const SilhouetteCells::Shares off = mask.shares - blurred(cells_.shares(tracker.predicted(mask.camera)));
+          all.insert(all.end(), off.data(), off.data() + off.size());
+        }
       }
     }
     return Eigen::Map<Eigen::VectorXd>(all.data(), static_cast<Index>(all.size()));
@@ -231,21 +235,13 @@ class FixedLagTracker {
   }
 
   void adapt() noexcept {
-    if (state_.size() == 0 || !std::any_of(seen_.begin() + first_, seen_.end(),
-                                           [](const Seen& seen) { return seen.believed && !seen.masks.empty(); })) {
+    const auto informs = [](const SeenMask& mask) { return mask.shares.size() > 0; };
+    const Index count = state_.size();
+    if (count == 0 ||
+        std::none_of(seen_.begin() + static_cast<std::ptrdiff_t>(first_), seen_.end(),
+                     [&](const Seen& seen) { return std::any_of(seen.masks.begin(), seen.masks.end(), informs); })) {
       return;
     }
-    observed_.assign(seen_.size() - static_cast<std::size_t>(first_), {});
-    Mask cleaned;
-    MaskCleaning cleaning(tracker_.settings().cleaning_window_px, tracker_.settings().smallest_region_px);
-    for (std::size_t k = 0; k < observed_.size(); ++k) {
-      for (const SeenMask& mask : seen_[k + static_cast<std::size_t>(first_)].masks) {
-        cleaned.resize(mask.mask.rows(), mask.mask.cols());
-        cleaning.apply(mask.mask, cleaned);
-        observed_[k].push_back(blurred(cells_.shares(cleaned)));
-      }
-    }
-    const Index count = state_.size();
     std::vector<Eigen::VectorXd> outcome(static_cast<std::size_t>(count + 1));
     parallel_ranges(count + 1, settings_.threads, 1, [&](Index k, Index) {
       Eigen::VectorXd probe = state_;
@@ -283,7 +279,7 @@ class FixedLagTracker {
       return;
     }
     Tracker again = past_;
-    for (std::size_t k = static_cast<std::size_t>(first_); k < seen_.size(); ++k) {
+    for (std::size_t k = first_; k < seen_.size(); ++k) {
       if (!show(again, seen_[k], trial, true).advanced()) {
         return;
       }
@@ -298,8 +294,7 @@ class FixedLagTracker {
   SilhouetteCells cells_;
   Eigen::VectorXd state_{};  ///< parameters in deviations, then the delay if it is one of them
   std::vector<Seen> seen_{};
-  int first_ = 0;  ///< of seen_, what came after past_
-  std::vector<std::vector<SilhouetteCells::Shares>> observed_{};
+  std::size_t first_ = 0;  ///< of seen_, what came after past_
 };
 
 }  // namespace decant

@@ -61,8 +61,9 @@ class HypothesisFilter {
 
   /// Takes all hypotheses to the frame's time. A hypothesis whose model fails is given up, as long as another one
   /// stands; then one that has become too improbable. Never throws; allocates where a tracker does.
-  /// @return how the frame went under the hypothesis that was the most probable before it.
-  FrameReport track(const TrackerFrame& frame) noexcept {
+  /// @return how the frame went under the hypothesis that was the most probable before it, or, if that one's model
+  /// failed, under the one that is now.
+  [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
     if (hypotheses_.empty()) {
       FrameReport nothing;
       nothing.status = FrameStatus::BadInput;
@@ -77,7 +78,7 @@ class HypothesisFilter {
       }
     });
     give_up();
-    return hypotheses_[before].report;
+    return hypotheses_[given_up(before) && !hypotheses_[before].report.advanced() ? best() : before].report;
   }
 
   std::size_t size() const noexcept { return hypotheses_.size(); }

@@ -5,8 +5,6 @@
 /// does not sway.
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 
 #include <Eigen/Core>
 
@@ -30,16 +28,13 @@ class SilhouetteCells {
   /// Share of liquid among the pixels of each cell, 0 .. 1.
   Shares shares(const ConstMaskView& mask) const {
     const auto cells = [&](Index pixels) { return (pixels + cell_px_ - 1) / cell_px_; };
-    Shares result = Shares::Zero(cells(mask.rows()), cells(mask.cols()));
-    for (Index row = 0; row < mask.rows(); ++row) {
-      for (Index column = 0; column < mask.cols(); ++column) {
-        result(row / cell_px_, column / cell_px_) += is_liquid(mask(row, column)) ? 1.0 : 0.0;
-      }
-    }
+    Shares result(cells(mask.rows()), cells(mask.cols()));
     for (Index row = 0; row < result.rows(); ++row) {
-      const Index height = std::min<Index>(cell_px_, mask.rows() - row * cell_px_);
+      const Index top = row * cell_px_, height = std::min<Index>(cell_px_, mask.rows() - top);
       for (Index column = 0; column < result.cols(); ++column) {
-        result(row, column) /= static_cast<double>(height * std::min<Index>(cell_px_, mask.cols() - column * cell_px_));
+        const Index left = column * cell_px_, width = std::min<Index>(cell_px_, mask.cols() - left);
+        const Index liquid = (mask.block(top, left, height, width) >= 128).count();
+        result(row, column) = static_cast<double>(liquid) / static_cast<double>(height * width);
       }
     }
     return result;

@@ -166,19 +166,11 @@ class Tracker {
   [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
     FrameReport report;
     report.time = model_.time();
+    report.status = check(frame);
+    if (report.status != FrameStatus::Ok) {
+      return report;
+    }
     const double duration = frame.time - model_.time();
-    if (!std::isfinite(frame.time) || duration > settings_.longest_gap) {
-      report.status = FrameStatus::Gap;
-      return report;
-    }
-    if (duration < 0 || (duration == 0 && started_)) {
-      report.status = FrameStatus::Late;
-      return report;
-    }
-    if (!usable(frame)) {
-      report.status = FrameStatus::BadInput;
-      return report;
-    }
     if (duration > 0) {
       const Stopwatch physics(report.physics_ms);
       for (const TrackedPose& pose : frame.poses) {
@@ -205,6 +197,18 @@ class Tracker {
     report.posterior = compare();
     report.log_likelihood = likelihood_.log_likelihood(report.posterior);
     return report;
+  }
+
+  /// For what track() would refuse a frame (Late, Gap, BadInput), else Ok.
+  FrameStatus check(const TrackerFrame& frame) const noexcept {
+    const double duration = frame.time - model_.time();
+    if (!std::isfinite(frame.time) || duration > settings_.longest_gap) {
+      return FrameStatus::Gap;
+    }
+    if (duration < 0 || (duration == 0 && started_)) {
+      return FrameStatus::Late;
+    }
+    return usable(frame) ? FrameStatus::Ok : FrameStatus::BadInput;
   }
 
   /// Forgets earlier frames' observations; the model stays as it is.

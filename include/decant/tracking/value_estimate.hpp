@@ -17,7 +17,7 @@ namespace decant {
 struct ValueEstimate {
   double mean = 0;
   double low = 0, high = 0;  ///< central interval of the confidence asked for
-  /// The smallest or largest value asked about is within the interval: it may lie outside what was asked.
+  /// The interval comes within half a gap of the smallest or largest value: the quantity may lie beyond them.
   bool at_end = false;
 };
 
@@ -59,11 +59,11 @@ inline ValueEstimate estimate_value(std::span<const double> values, std::span<co
   std::vector<double> place, mass;
   double total = 0;
   for (std::size_t k = 0; k < last; ++k) {
-    const double gap = values[k + 1] - values[k];
+    const double gap = values[k + 1] - values[k], left = slope(k), right = slope(k + 1);
     for (int piece = 0; piece < pieces; ++piece) {
       const double u = (piece + 0.5) / pieces;
       const double cubic = (1 + 2 * u) * (1 - u) * (1 - u) * level(k) + u * u * (3 - 2 * u) * level(k + 1) +
-                           gap * u * (1 - u) * ((1 - u) * slope(k) - u * slope(k + 1));
+                           gap * u * (1 - u) * ((1 - u) * left - u * right);
       place.push_back(values[k] + u * gap);
       mass.push_back(std::exp(cubic) * gap / pieces);
       total += mass.back();
