@@ -106,6 +106,40 @@ TEST_CASE("tracker: a camera that moves sees from where it is") {
   CHECK(tracker.track({0.3, {}, masks}).status == FrameStatus::Ok);
 }
 
+TEST_CASE("tracker: gaps between particles are closed from near and far, those between films are not") {
+  // two films, three spacings apart
+  FallingDust film;
+  film.gravity = 0;
+  const double apart = film.spacing();
+  film.dust.resize(128);
+  for (Index i = 0; i < film.dust.size(); ++i) {
+    const double side = i < 64 ? -8.5 : 1.5;
+    film.dust.position.col(i) = Vector3<double>(i % 8 + side, 0, i % 64 / 8 - 3.5) * apart;
+  }
+  TrackerSettings settings;
+  settings.sphere_in_spacings = 0.4;  // does not reach the next particle
+  for (const double distance : {0.25, 0.5, 1.0}) {
+    CAPTURE(distance);
+    Pose camera_from_world = decant_test::before_the_block();
+    camera_from_world.translation.z() = distance;
+    Tracker<FallingDust, OpenLoop<double>> tracker(film, {}, settings);
+    tracker.add_camera(decant_test::seeing_camera(), camera_from_world);
+    REQUIRE(tracker.track({0, {}, {}}).advanced());
+    const Mask& mask = tracker.predicted(0);
+    const auto liquid = [&](double x, double z) {
+      const double scale = 500 / distance;
+      return mask(std::lround(79.5 - scale * z * apart), std::lround(99.5 + scale * x * apart)) != 0;
+    };
+    for (int z = -3; z <= 3; ++z) {
+      for (int x = 0; x < 7; ++x) {  // midway between four particles
+        REQUIRE(liquid(x - 8, z));
+        REQUIRE(liquid(x + 2, z));
+      }
+      REQUIRE_FALSE(liquid(0, z));
+    }
+  }
+}
+
 TEST_CASE("tracker: without correction the model runs as it does alone, bit for bit") {
   SimulatorSettings settings;
   settings.spacing = decant_test::block_spacing;

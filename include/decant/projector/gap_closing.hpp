@@ -23,8 +23,19 @@ class GapClosing {
   /// @param gap_px closes gaps up to this width [px], 0 (does nothing) to 64; an odd number acts as the even one above
   /// it, since the disc, of radius gap_px / 2, reaches as far to either side. With 4 px, silhouettes of particles
   /// agreed best with recorded masks. Throws std::invalid_argument.
-  explicit GapClosing(int gap_px = 4) : gap_px_(gap_px), radius_((gap_px + 1) / 2) {
-    expects(gap_px >= 0 && gap_px <= 64, "GapClosing: gap_px [px]", "0 to 64", gap_px);
+  explicit GapClosing(int gap_px = 4) {
+    half_width_.reserve(widest_px / 2 + 1);
+    set_gap_px(gap_px);
+  }
+
+  static constexpr int widest_px = 64;
+
+  /// As on construction. Does not allocate.
+  void set_gap_px(int gap_px) {
+    expects(gap_px >= 0 && gap_px <= widest_px, "GapClosing: gap_px [px]", "0 to 64", gap_px);
+    gap_px_ = gap_px;
+    radius_ = (gap_px + 1) / 2;
+    half_width_.clear();
     for (int dv = 0; dv <= radius_; ++dv) {
       int half = radius_;
       while (half * half + dv * dv > radius_ * radius_) {

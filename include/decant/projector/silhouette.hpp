@@ -69,6 +69,8 @@ class Silhouette {
   /// How many particles cover each pixel, as of the last render.
   const Image<float>& coverage() const noexcept { return coverage_; }
   const ProjectorType& projector() const noexcept { return projector_; }
+  GapClosing& closing() noexcept { return closing_; }
+  const GapClosing& closing() const noexcept { return closing_; }
 
  private:
   ProjectorType projector_;

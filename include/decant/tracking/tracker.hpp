@@ -4,6 +4,7 @@
 /// Closing the loop: a simulation runs along with a camera, and is corrected by what the camera sees, frame by frame.
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -23,6 +24,7 @@
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
+#include <decant/projector/gap_closing.hpp>
 #include <decant/projector/silhouette.hpp>
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/liquid_model.hpp>
@@ -33,15 +35,15 @@ namespace decant {
 
 /// What a tracker needs to know beside its model and its corrector.
 struct TrackerSettings {
-  double sphere_in_spacings = 0.66;     ///< radius with which particles are drawn, over their spacing, > 0
-  int gap_closing_px = 4;               ///< gaps in the drawn silhouette up to this are closed, 0 .. 64
-  int cleaning_window_px = 3;           ///< of MaskCleaning; 1 takes masks as they come
-  int smallest_region_px = 10;          ///< likewise
-  int least_pixels = 150;               ///< of liquid in a mask that is believed in any case: see MaskTrust; >= 1
-  double occlusion_margin = 1e-3;       ///< see RayOcclusion [m]
-  int relaxation_sweeps = 4;            ///< after each correction, what is too dense moves apart; >= 0
-  double longest_path_in_spacings = 5;  ///< longer moves are mass taken from place to place, not paths; > 0
-  double longest_gap = 1;               ///< between frames [s]; later ones are refused, > 0
+  double sphere_in_spacings = 0.66;      ///< radius with which particles are drawn, over their spacing, > 0
+  double gap_closing_in_spacings = 1.4;  ///< wider gaps between particles are not liquid; the diagonal in a film; >= 0
+  int cleaning_window_px = 3;            ///< of MaskCleaning; 1 takes masks as they come
+  int smallest_region_px = 10;           ///< likewise
+  int least_pixels = 150;                ///< of liquid in a mask that is believed in any case: see MaskTrust; >= 1
+  double occlusion_margin = 1e-3;        ///< see RayOcclusion [m]
+  int relaxation_sweeps = 4;             ///< after each correction, what is too dense moves apart; >= 0
+  double longest_path_in_spacings = 5;   ///< longer moves are mass taken from place to place, not paths; > 0
+  double longest_gap = 1;                ///< between frames [s]; later ones are refused, > 0
   ImageLikelihoodSettings likelihood{};
   Vector3<double> gravity{0, 0, -9.81};  ///< [m/s^2], for correctors
   Threads threads{};
@@ -146,6 +148,8 @@ class Tracker {
         likelihood_(settings.likelihood) {
     expects(settings.sphere_in_spacings > 0 && settings.sphere_in_spacings < 100, "Tracker: sphere_in_spacings",
             "> 0 and < 100", settings.sphere_in_spacings);
+    expects(settings.gap_closing_in_spacings >= 0 && settings.gap_closing_in_spacings < 100,
+            "Tracker: gap_closing_in_spacings", ">= 0 and < 100", settings.gap_closing_in_spacings);
     expects(settings.least_pixels >= 1, "Tracker: least_pixels", ">= 1", settings.least_pixels);
     expects(settings.relaxation_sweeps >= 0, "Tracker: relaxation_sweeps", ">= 0", settings.relaxation_sweeps);
     expects(settings.longest_path_in_spacings > 0, "Tracker: longest_path_in_spacings", "> 0",
@@ -273,8 +277,7 @@ class Tracker {
 
     Eye(const Camera& camera, const Pose& camera_from_world, const Settings& settings, const Model& model)
         : occlusion(PosedCamera<Camera>(camera, camera_from_world), settings.occlusion_margin),
-          silhouette(DiscSplat<Scalar>(settings.sphere_in_spacings * model.spacing()),
-                     GapClosing(settings.gap_closing_px)),
+          silhouette(DiscSplat<Scalar>(settings.sphere_in_spacings * model.spacing()), GapClosing(0)),
           cleaning(settings.cleaning_window_px, settings.smallest_region_px),
           trust(settings.least_pixels),
           observed(Mask::Zero(camera.height(), camera.width())),
@@ -326,12 +329,29 @@ class Tracker {
     }
   }
 
+  /// Median over some of the particles [px/m]; 0 if the camera can see none of these.
+  static double pixels_per_metre(const PosedCamera<Camera>& camera, const ConstPointsView<Scalar>& position) noexcept {
+    std::array<double, 256> scale;
+    std::size_t count = 0;
+    for (Index i = 0; i < position.cols(); i += 1 + position.cols() / static_cast<Index>(scale.size())) {
+      const double both_ways = camera.jacobian(position.col(i).template cast<double>()).squaredNorm();
+      if (both_ways > 0) {
+        scale[count++] = std::sqrt(0.5 * both_ways);
+      }
+    }
+    const auto median = scale.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(scale.begin(), median, scale.begin() + static_cast<std::ptrdiff_t>(count));
+    return count > 0 ? *median : 0;
+  }
+
   void draw(const Model& model, Eye& eye, Mask& mask) noexcept {
     const auto& position = const_cast<Model&>(model).fluid().position;
     eye.occlusion.follow(model.bodies(), model.time());
     eye.hidden.resize(static_cast<std::size_t>(position.count()));
     find_hidden(eye.occlusion, position, settings_.threads, eye.hidden);
     const PosedCamera<Camera>& camera = eye.occlusion.camera();
+    const double gap_px = settings_.gap_closing_in_spacings * model.spacing() * pixels_per_metre(camera, position);
+    eye.silhouette.closing().set_gap_px(static_cast<int>(std::lround(std::min<double>(gap_px, GapClosing::widest_px))));
     eye.silhouette.render(position, eye.hidden, camera.camera(), camera.camera_from_world(), mask, settings_.threads);
   }
 
