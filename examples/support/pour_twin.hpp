@@ -46,8 +46,8 @@ struct PourTwin {
   bool hidden_physics = true;  ///< false: the reality is the model itself, at another spacing
   bool noisy_poses = true;
   bool noisy_masks = true;
-  double spacing = 0.0037;  ///< of the reality's particles [m]
-  double duration = 4;      ///< [s]
+  double spacing = 0.003;  ///< of the reality's particles [m]: 2.4 times as many as the tracking model's
+  double duration = 4;     ///< [s]
   double frames_per_second = 30;
   int threads = 0;  ///< 0: all; the recording does not depend on it
 };

@@ -301,6 +301,30 @@ inline void add_scores(decant::HtmlReport& report, const decant::Recording& reco
       " nat. Relocated is the liquid that a corrector took from place to place, all frames together.");
 }
 
+/// What methods found out beside the silhouettes, where they did.
+inline void add_estimates(decant::HtmlReport& report, const std::vector<NamedResult>& results) {
+  decant::Table table({"method", "estimate", "value", "90 % interval"});
+  bool beyond = false;
+  for (const auto& [name, result] : results) {
+    if (const auto& amount = result.initial_ml) {
+      beyond = beyond || amount->at_end;
+      table.add({name, "liquid at first [ml]", figure(amount->mean, 0),
+                 figure(amount->low, 0) + " to " + figure(amount->high, 0) + (amount->at_end ? " *" : "")});
+    }
+    for (const auto& [parameter, value] : result.parameters) {
+      table.add({name, parameter, figure(value, 3), figure(std::nan(""), 0)});
+    }
+  }
+  if (table.rows().size() == 1) {  // the header
+    return;
+  }
+  report.heading("Estimates");
+  report.table(table);
+  if (beyond) {
+    report.paragraph("* Or beyond the amounts that were asked about: the masks do not show it.");
+  }
+}
+
 inline std::vector<double> times_from_start(const decant::Recording& recording, std::size_t count) {
   std::vector<double> times;
   for (std::size_t frame = 0; frame < count; ++frame) {
@@ -480,6 +504,7 @@ inline void write_tracking_report(const std::filesystem::path& path, const decan
                    detail::figure(1e3 * options.spacing, 1) + " mm.");
   report.heading("Scores");
   detail::add_scores(report, recording, options, results, truth);
+  detail::add_estimates(report, results);
   // with the rest of the page the file stays below 8 MB
   const detail::Overlays overlays = detail::draw_overlays(recording, options, results, 6'500'000);
   const std::vector<std::size_t> chosen =

@@ -35,7 +35,7 @@
 namespace example {
 
 struct TrackingOptions {
-  double spacing = 0.005;           ///< of the model's particles [m]
+  double spacing = 0.004;           ///< of the model's particles [m]
   std::vector<double> forecasts{};  ///< how far ahead [s]
   int frames_between_forecasts = 10;
   int threads = 0;
@@ -138,6 +138,7 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
   using namespace decant;
   SimulatorSettings settings;
   settings.spacing = options.spacing;
+  settings.courant_number = 0.8;  // twice the default: scores are the same, and a quarter of the time is saved
   settings.gravity = recording.gravity;
   settings.liquid = {recording.liquid.density, recording.liquid.viscosity, recording.liquid.surface_tension};
   settings.threads = {options.threads};
