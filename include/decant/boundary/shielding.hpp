@@ -4,59 +4,103 @@
 /// Thin walls: liquid on two sides of a wall must not feel each other, however close it is.
 
 #include <algorithm>
+#include <cstddef>
+#include <vector>
 
 #include <decant/boundary/wall_state.hpp>
+#include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 
 namespace decant {
 
-namespace detail {
+/// Takes out of a neighbour list the pairs that a body's wall separates. Of a thousand pairs near walls hardly one is,
+/// so what walls do to particles (WallState) answers two cheap questions first, a batch of neighbours at a time: a pair
+/// that a wall separates is farther apart than both are from walls, and one of the two is behind the plane that touches
+/// the wall nearest to the other. Only then rays are sent to the surface.
+template <class ScalarType>
+class WallShield {
+ public:
+  using Scalar = ScalarType;
 
-/// Whether j, `apart` away from i, lies behind the plane that touches the wall nearest to i.
-template <class Scalar>
-bool beyond_wall_of(const WallState<Scalar>& walls, Index i, const Vector3<Scalar>& apart) noexcept {
-  const Vector3<Scalar> into = walls.gradient.col(i);
-  const Scalar depth = apart.dot(into);
-  const Scalar reach = Scalar(0.5) * walls.distance[i];
-  return depth > 0 && depth * depth > reach * reach * into.squaredNorm();
-}
-
-/// Cheap first questions, of which a pair that a wall separates passes both: the two are farther apart than both
-/// walls are near, and one of them is behind the plane that touches the wall nearest to the other.
-template <class Scalar>
-bool may_be_separated(const WallState<Scalar>& walls, Index i, Index j, const Vector3<Scalar>& apart) noexcept {
-  if (walls.contact_count[i] == 0 && walls.contact_count[j] == 0) {
-    return false;
+  /// @param walls of the positions that the list was built from. The list becomes one of fewer pairs, still symmetric.
+  template <class Bodies, class Neighbors>
+  void apply(const Bodies& bodies, const WallState<Scalar>& walls, Neighbors& neighbors, Threads threads) noexcept {
+    if (bodies.size() == 0) {
+      return;
+    }
+    note_walls(walls, neighbors.size(), threads);
+    neighbors.remove_if([&](Index i) { return walls.contact_count[i] > 0 && any_suspect(neighbors, i); },
+                        [&](Index i, Index j, const Vector3<Scalar>& from_j_to_i) {
+                          if (walls.contact_count[j] == 0 || !may_be_separated(i, j, from_j_to_i)) {
+                            return false;
+                          }
+                          // the same question from both ends, so that pairs stay symmetric
+                          const Index a = std::min(i, j), b = std::max(i, j);
+                          const Vector3<Scalar> x_a = neighbors.position(a), x_b = neighbors.position(b);
+                          return bodies.separated(x_a, x_b, walls.contacts_of(a), walls.contact_count[a]) ||
+                                 bodies.separated(x_a, x_b, walls.contacts_of(b), walls.contact_count[b]);
+                        },
+                        threads);
   }
-  // looked-up distances may be off by a fraction of a grid cell; a tenth covers that
-  const Scalar walls_between = Scalar(0.9) * (walls.distance[i] + walls.distance[j]);
-  return apart.squaredNorm() > walls_between * walls_between &&
-         (beyond_wall_of(walls, i, apart) || beyond_wall_of<Scalar>(walls, j, -apart));
-}
 
-}  // namespace detail
+ private:
+  /// Looked-up distances may be off by a fraction of a grid cell; a tenth covers that.
+  static constexpr Scalar sure_of_distance = Scalar(0.9);
+  static constexpr Scalar sure_of_plane = Scalar(0.5);
 
-/// Takes out of a neighbour list the pairs that a body's wall separates. @param walls sampled at these positions.
-template <class Bodies, class Scalar, class Positions, class Neighbors>
-void shield_neighbors(const Bodies& bodies, const WallState<Scalar>& walls, const Positions& position,
-                      Neighbors& neighbors, Threads threads) noexcept {
-  if (bodies.size() == 0) {
-    return;
+  /// Puts what is asked for side by side.
+  void note_walls(const WallState<Scalar>& walls, Index count, Threads threads) noexcept {
+    wall_.resize(4 * static_cast<std::size_t>(count));
+    parallel_for(count, threads, [&](Index i) {
+      Scalar* const record = &wall_[4 * static_cast<std::size_t>(i)];
+      record[0] = walls.gradient(0, i);
+      record[1] = walls.gradient(1, i);
+      record[2] = walls.gradient(2, i);
+      record[3] = walls.distance[i];
+    });
   }
-  neighbors.remove_if(
-      [&](Index i, Index j) {
-        const Vector3<Scalar> apart = position.col(j) - position.col(i);
-        if (!detail::may_be_separated(walls, i, j, apart)) {
-          return false;
-        }
-        // the same question from both ends, so that pairs stay symmetric
-        const Index a = std::min(i, j), b = std::max(i, j);
-        const Vector3<Scalar> x_a = position.col(a), x_b = position.col(b);
-        return bodies.separated(x_a, x_b, walls.contacts_of(a), walls.contact_count[a]) ||
-               bodies.separated(x_a, x_b, walls.contacts_of(b), walls.contact_count[b]);
-      },
-      threads);
-}
+
+  /// Whether what is `x` [m] away from a particle lies behind the plane that touches the wall nearest to it.
+  template <class Number>
+  static auto behind_wall(const Number& into_x, const Number& into_y, const Number& into_z, const Number& distance,
+                          const Number& x, const Number& y, const Number& z) noexcept {
+    const Number depth = into_x * x + into_y * y + into_z * z;
+    const Number reach = Number(sure_of_plane) * distance;
+    return (depth > Number(Scalar(0))) & (depth * depth > reach * reach * squared_length(into_x, into_y, into_z));
+  }
+
+  bool may_be_separated(Index i, Index j, const Vector3<Scalar>& from_j_to_i) const noexcept {
+    const Scalar* const one = &wall_[4 * static_cast<std::size_t>(i)];
+    const Scalar* const other = &wall_[4 * static_cast<std::size_t>(j)];
+    const Scalar between = sure_of_distance * (one[3] + other[3]);
+    const Scalar x = from_j_to_i[0], y = from_j_to_i[1], z = from_j_to_i[2];
+    return squared_length(x, y, z) > between * between &&
+           (behind_wall<Scalar>(one[0], one[1], one[2], one[3], -x, -y, -z) ||
+            behind_wall<Scalar>(other[0], other[1], other[2], other[3], x, y, z));
+  }
+
+  /// may_be_separated of any neighbour. A little more is suspected, so that rounding makes no difference.
+  template <class Neighbors>
+  bool any_suspect(const Neighbors& neighbors, Index i) const noexcept {
+    using B = Batch<Scalar>;
+    const Scalar* const own = &wall_[4 * static_cast<std::size_t>(i)];
+    const B own_x(own[0]), own_y(own[1]), own_z(own[2]), own_distance(own[3]);
+    const B nearly(Scalar(0.99));
+    bool found = false;
+    neighbors.for_each_batch(i, [&](const auto& pair) {
+      const auto other = gather4(wall_.data(), pair.neighbor);
+      const B between = nearly * sure_of_distance * (own_distance + other.w);
+      const B zero(Scalar(0));
+      const auto behind =
+          behind_wall<B>(own_x, own_y, own_z, nearly * own_distance, zero - pair.x, zero - pair.y, zero - pair.z) |
+          behind_wall<B>(other.x, other.y, other.z, nearly * other.w, pair.x, pair.y, pair.z);
+      found = found || any(pair.valid & behind & (pair.distance_squared > between * between));
+    });
+    return found;
+  }
+
+  std::vector<Scalar> wall_{};  ///< records of four: gradient of the share, distance
+};
 
 }  // namespace decant

@@ -119,16 +119,31 @@ class NeighborList {
     }
   }
 
-  /// Strikes out the pairs for which predicate(Index i, Index j) holds. It must be symmetric, or forces are no longer
-  /// mutual, and callable from many threads.
-  template <class Predicate>
-  void remove_if(Predicate&& predicate, Threads threads = {}) noexcept {
+  Vector3<Scalar> position(Index i) const noexcept {
+    const Scalar* const record = records_.data() + 4 * i;
+    return {record[0], record[1], record[2]};
+  }
+
+  /// Strikes out the pairs for which predicate(Index i, Index j, Vector3<Scalar> x_i - x_j [m]) holds, in rows i of
+  /// which concerns(Index i) holds. Both must be symmetric together, or forces are no longer mutual, and callable from
+  /// many threads.
+  template <class Concerns, class Predicate>
+  void remove_if(Concerns&& concerns, Predicate&& predicate, Threads threads = {}) noexcept {
     parallel_for(size(), threads, [&](Index i) {
+      if (!concerns(i)) {
+        return;
+      }
       Row& row = rows_[static_cast<std::size_t>(i)];
       std::uint32_t* const begin = index_.data() + row.first;
       std::uint32_t* const end = begin + row.count;
-      std::uint32_t* const kept =
-          std::remove_if(begin, end, [&](std::uint32_t j) { return predicate(i, static_cast<Index>(j)); });
+      const Vector3<Scalar> x = position(i);
+      std::uint32_t* const kept = std::remove_if(begin, end, [&](std::uint32_t neighbor) {
+        const auto j = static_cast<Index>(neighbor);
+        const Vector3<Scalar> y = position(j);
+        return predicate(i, j,
+                         Vector3<Scalar>(domain_.separation(0, x[0], y[0]), domain_.separation(1, x[1], y[1]),
+                                         domain_.separation(2, x[2], y[2])));
+      });
       std::fill(kept, end, static_cast<std::uint32_t>(i));
       row.count = static_cast<std::uint32_t>(kept - begin);
     });

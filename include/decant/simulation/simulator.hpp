@@ -559,7 +559,7 @@ class Simulator {
     }
     neighbors_.build_from(search_, fluid_.position, settings_.threads);
     bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
-    shield_neighbors(bodies_, walls_, fluid_.position, neighbors_, settings_.threads);
+    shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
   }
 
   void compute_densities() noexcept {
@@ -698,6 +698,7 @@ class Simulator {
   FluidState<Scalar> fluid_{};
   Neighbors neighbors_;
   WallState<Scalar> walls_{};
+  WallShield<Scalar> shield_{};
   GradientCorrection<Scalar> correction_{};
   double time_ = 0;
   double longest_step_ = 0;  ///< that the last sub-step could have been; 0 before the first
