@@ -8,7 +8,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
@@ -35,12 +38,14 @@ class CoarseCells {
     number_cells(step);
     begin_.assign(keys_.size() + 1, 0);
     cell_.resize(count);
+    slot_.resize(count);
     std::uint32_t cell = 0;
     for (std::size_t i = 0; i < count; ++i) {
       if (keys_[cell] != key_[i]) {
         cell = static_cast<std::uint32_t>(std::lower_bound(keys_.begin(), keys_.end(), key_[i]) - keys_.begin());
       }
       cell_[i] = cell;
+      slot_[i] = static_cast<std::uint8_t>((key_[i] >> 40 & 4) | (key_[i] >> 20 & 2) | (key_[i] & 1));
       ++begin_[cell + 1];
     }
     for (std::size_t c = 1; c < begin_.size(); ++c) {
@@ -82,47 +87,33 @@ class CoarseCells {
     felt_.resize(cell_.size());
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
       Felt& felt = felt_[static_cast<std::size_t>(i)];
-      felt.count = 0;
-      int at = 0;
+      felt = Felt{};
       system.for_each_response(step.neighbors, i, [&](std::size_t j, Scalar x, Scalar y, Scalar z) {
-        // neighbours come in runs of one cell
-        if (at >= felt.count || felt.part[static_cast<std::size_t>(at)].cell != cell_[j]) {
-          at = felt.place_of(cell_[j]);
-        }
-        Part& part = felt.part[static_cast<std::size_t>(at)];
-        part.x += contact[j] * x;
-        part.y += contact[j] * y;
-        part.z += contact[j] * z;
+        const Index slot = slot_[j];
+        felt.cell[static_cast<std::size_t>(slot)] = cell_[j];
+        felt.part(slot, 0) += contact[j] * x;
+        felt.part(slot, 1) += contact[j] * y;
+        felt.part(slot, 2) += contact[j] * z;
       });
-      felt.sort();
     });
+    find_groups();
     lay_out_profile();
-    // neighbours in the list feel the same cells: what they add is gathered before it goes into the matrix
-    std::array<double, most_felt * most_felt> gathered{};
-    const Felt* group = nullptr;
     const double squared_step = static_cast<double>(step.time_step) * static_cast<double>(step.time_step);
-    const auto put_down = [&] {
-      for (std::size_t k = 0; group != nullptr && k < static_cast<std::size_t>(group->count); ++k) {
-        for (std::size_t l = 0; l <= k; ++l) {
-          entry(group->part[k].cell, group->part[l].cell) += squared_step * gathered[most_felt * k + l];
-        }
+    std::size_t i = 0;
+    for (const Group& group : groups_) {
+      Products gathered = Products::Zero();
+      for (; i < group.end; ++i) {
+        gathered.noalias() += felt_[i].part.lazyProduct(felt_[i].part.transpose());
       }
-      gathered.fill(0);
-    };
-    for (const Felt& felt : felt_) {
-      if (group == nullptr || !felt.same_cells(*group)) {
-        put_down();
-        group = &felt;
-      }
-      for (std::size_t k = 0; k < static_cast<std::size_t>(felt.count); ++k) {
-        const Part& one = felt.part[k];
-        for (std::size_t l = 0; l <= k; ++l) {
-          const Part& other = felt.part[l];
-          gathered[most_felt * k + l] += static_cast<double>(one.x * other.x + one.y * other.y + one.z * other.z);
+      for (std::size_t k = 0; k < slots; ++k) {
+        for (std::size_t l = 0; l < slots && group.cell[k] != none; ++l) {
+          if (group.cell[l] <= group.cell[k]) {
+            entry(group.cell[k], group.cell[l]) +=
+                squared_step * static_cast<double>(gathered(static_cast<Index>(k), static_cast<Index>(l)));
+          }
         }
       }
     }
-    put_down();
     factorize();
   }
 
@@ -151,40 +142,49 @@ class CoarseCells {
   static constexpr std::size_t most_cells = 2000;
   /// Over the support radius: a particle then feels no more than two cells along an axis.
   static constexpr Scalar cell_width = Scalar(2.0001);
-  static constexpr std::size_t most_felt = 8;
+  static constexpr std::size_t slots = 8;
+  static constexpr auto none = std::numeric_limits<std::uint32_t>::max();
 
-  /// Minus the acceleration of a particle by a unit of pressure in a cell.
-  struct Part {
-    std::uint32_t cell;
-    Scalar x, y, z;
-  };
+  using Parts = Eigen::Matrix<Scalar, static_cast<int>(slots), 3>;
+  using Products = Eigen::Matrix<Scalar, static_cast<int>(slots), static_cast<int>(slots)>;
+
+  /// Minus the acceleration of a particle by a unit of pressure in each of the cells around it. Two that follow each
+  /// other along each axis, so whether a cell's numbers are even or odd says in which slot it is. (At the seam of a
+  /// periodic domain two cells may be taken for one: the preconditioner is less exact there.)
   struct Felt {
-    int count;
-    std::array<Part, most_felt> part;
+    std::array<std::uint32_t, slots> cell{none, none, none, none, none, none, none, none};
+    Parts part = Parts::Zero();
+  };
 
-    int place_of(std::uint32_t cell) noexcept {
-      for (int k = 0; k < count; ++k) {
-        if (part[static_cast<std::size_t>(k)].cell == cell) {
-          return k;
-        }
+  /// Particles that follow each other in the list and feel the same cells, or no others: what they add to the matrix is
+  /// gathered before it goes there.
+  struct Group {
+    std::array<std::uint32_t, slots> cell;
+    std::size_t end;
+
+    bool take(const Felt& felt) noexcept {
+      std::array<std::uint32_t, slots> both;
+      std::uint32_t different = 0;
+      for (std::size_t k = 0; k < slots; ++k) {
+        const std::uint32_t a = cell[k], b = felt.cell[k];
+        both[k] = std::min(a, b);
+        different |= std::max(a, b) == none ? 0 : a ^ b;
       }
-      // more than eight only at the seam of a periodic domain: joined with another, the preconditioner is less exact
-      if (count < static_cast<int>(most_felt)) {
-        part[static_cast<std::size_t>(count++)] = {cell, 0, 0, 0};
-      }
-      return count - 1;
-    }
-
-    /// By cell; there are few.
-    void sort() noexcept {
-      std::sort(part.begin(), part.begin() + count, [](const Part& a, const Part& b) { return a.cell < b.cell; });
-    }
-
-    bool same_cells(const Felt& other) const noexcept {
-      return count == other.count && std::equal(part.begin(), part.begin() + count, other.part.begin(),
-                                                [](const Part& a, const Part& b) { return a.cell == b.cell; });
+      const bool same = different == 0;
+      cell = same ? both : cell;
+      return same;
     }
   };
+
+  void find_groups() {
+    groups_.clear();
+    for (std::size_t i = 0; i < felt_.size(); ++i) {
+      if (groups_.empty() || !groups_.back().take(felt_[i])) {
+        groups_.push_back({felt_[i].cell, i});
+      }
+      groups_.back().end = i + 1;
+    }
+  }
 
   /// Finds the cells that hold liquid, and in key_ the cell of each particle.
   template <class Step>
@@ -230,10 +230,12 @@ class CoarseCells {
     for (std::size_t c = 0; c < cells; ++c) {
       first_[c] = static_cast<std::uint32_t>(c);
     }
-    for (const Felt& felt : felt_) {
-      for (std::size_t k = 0; k < static_cast<std::size_t>(felt.count); ++k) {
-        std::uint32_t& first = first_[felt.part[k].cell];
-        first = std::min(first, felt.part[0].cell);
+    for (const Group& group : groups_) {
+      const std::uint32_t lowest = *std::min_element(group.cell.begin(), group.cell.end());
+      for (const std::uint32_t cell : group.cell) {
+        if (cell != none) {
+          first_[cell] = std::min(first_[cell], lowest);
+        }
       }
     }
     row_.resize(cells);
@@ -266,8 +268,10 @@ class CoarseCells {
 
   std::vector<std::uint64_t> keys_{}, key_{};                 ///< of all cells, in order; of each particle's
   std::vector<std::uint32_t> cell_{};                         ///< of each particle
+  std::vector<std::uint8_t> slot_{};                          ///< of its cell, see Felt
   std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};  ///< the particles of each cell
   std::vector<Felt> felt_{};
+  std::vector<Group> groups_{};
   std::vector<std::uint32_t> first_{};
   std::vector<std::size_t> row_{};  ///< where column 0 of each row would be
   std::vector<double> matrix_{}, value_{};
