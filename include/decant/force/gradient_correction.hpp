@@ -4,6 +4,7 @@
 /// What makes kernel gradients exact for velocities that vary linearly, whatever the arrangement of the particles.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -52,20 +53,17 @@ class GradientCorrection {
         yz = multiply_add(y, pair.z, yz);
         zz = multiply_add(z, pair.z, zz);
       });
-      Matrix3 moment;
-      moment << sum(xx), sum(xy), sum(xz), sum(xy), sum(yy), sum(yz), sum(xz), sum(yz), sum(zz);
-      moment /= -step.rest_density;
+      const Scalar volume = -1 / step.rest_density;
       const auto wall = step.walls.moment.col(i);
-      moment +=
-          (Matrix3() << wall[0], wall[1], wall[2], wall[1], wall[3], wall[4], wall[2], wall[4], wall[5]).finished();
-      set(i, shortened_inverse(moment));
+      set(i, shortened_inverse({volume * sum(xx) + wall[0], volume * sum(xy) + wall[1], volume * sum(xz) + wall[2],
+                                volume * sum(yy) + wall[3], volume * sum(yz) + wall[4], volume * sum(zz) + wall[5]}));
     });
   }
 
   Index size() const noexcept { return static_cast<Index>(first_.size() / 4); }
 
   /// L_i times a gradient.
-  Vector3<Scalar> apply(Index i, const Vector3<Scalar>& g) const noexcept {
+  [[gnu::always_inline]] Vector3<Scalar> apply(Index i, const Vector3<Scalar>& g) const noexcept {
     const Scalar* a = &first_[4 * static_cast<std::size_t>(i)];
     const Scalar* b = &second_[4 * static_cast<std::size_t>(i)];
     return {a[0] * g[0] + a[1] * g[1] + a[2] * g[2], a[1] * g[0] + b[0] * g[1] + b[1] * g[2],
@@ -86,25 +84,41 @@ class GradientCorrection {
   }
 
  private:
-  using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+  /// A symmetric matrix.
+  struct Symmetric {
+    Scalar xx, xy, xz, yy, yz, zz;
 
-  static Matrix3 shortened_inverse(const Matrix3& moment) noexcept {
+    Scalar largest_row_sum() const noexcept {
+      return std::max({std::abs(xx) + std::abs(xy) + std::abs(xz), std::abs(xy) + std::abs(yy) + std::abs(yz),
+                       std::abs(xz) + std::abs(yz) + std::abs(zz)});
+    }
+    /// Of two that commute, so that their product is symmetric.
+    friend Symmetric operator*(const Symmetric& a, const Symmetric& b) noexcept {
+      return {a.xx * b.xx + a.xy * b.xy + a.xz * b.xz, a.xx * b.xy + a.xy * b.yy + a.xz * b.yz,
+              a.xx * b.xz + a.xy * b.yz + a.xz * b.zz, a.xy * b.xy + a.yy * b.yy + a.yz * b.yz,
+              a.xy * b.xz + a.yy * b.yz + a.yz * b.zz, a.xz * b.xz + a.yz * b.yz + a.zz * b.zz};
+    }
+  };
+
+  static Symmetric shortened_inverse(const Symmetric& moment) noexcept {
     // liquid that is far too dense: the series wants eigenvalues below two
-    const Scalar scale = std::max(Scalar(1), moment.cwiseAbs().rowwise().sum().maxCoeff() / Scalar(1.5));
-    const Matrix3 rest = Matrix3::Identity() - moment / scale;
-    const Matrix3 squared = rest * rest;
-    return (Matrix3::Identity() + rest + squared + rest * squared) / scale;
+    const Scalar shrink = 1 / std::max(Scalar(1), moment.largest_row_sum() / Scalar(1.5));
+    const Symmetric e{1 - shrink * moment.xx, -shrink * moment.xy, -shrink * moment.xz,
+                      1 - shrink * moment.yy, -shrink * moment.yz, 1 - shrink * moment.zz};
+    const Symmetric e2 = e * e, e3 = e * e2;
+    return {shrink * (1 + e.xx + e2.xx + e3.xx), shrink * (e.xy + e2.xy + e3.xy), shrink * (e.xz + e2.xz + e3.xz),
+            shrink * (1 + e.yy + e2.yy + e3.yy), shrink * (e.yz + e2.yz + e3.yz), shrink * (1 + e.zz + e2.zz + e3.zz)};
   }
 
-  void set(Index i, const Matrix3& m) noexcept {
+  void set(Index i, const Symmetric& m) noexcept {
     Scalar* a = &first_[4 * static_cast<std::size_t>(i)];
     Scalar* b = &second_[4 * static_cast<std::size_t>(i)];
-    a[0] = m(0, 0);
-    a[1] = m(0, 1);
-    a[2] = m(0, 2);
-    b[0] = m(1, 1);
-    b[1] = m(1, 2);
-    b[2] = m(2, 2);
+    a[0] = m.xx;
+    a[1] = m.xy;
+    a[2] = m.xz;
+    b[0] = m.yy;
+    b[1] = m.yz;
+    b[2] = m.zz;
     a[3] = b[3] = 0;
   }
 

@@ -46,29 +46,30 @@ struct ResidualViscosity {
     }
     using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
+    note_velocities(step);
     compute_gradients(step);
-    compute_coefficients(step);
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(0.01) * h * h;
     const Scalar factor = 5 / step.rest_density;  // half of each one's nu
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
       const auto own = 4 * static_cast<std::size_t>(i);
+      const Scalar *const velocity = &velocity_[own], *const stretch = &stretch_[own], *const shear = &shear_[own];
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const auto other = gather3(velocity_.data(), pair.neighbor);
-        const auto along = [&](std::size_t axis) __attribute__((always_inline)) {
-          const Scalar* g = &gradient_[axis][own];
-          const auto other_g = gather3(gradient_[axis].data(), pair.neighbor);
-          return (other_g.x + g[0]) * pair.x + (other_g.y + g[1]) * pair.y + (other_g.z + g[2]) * pair.z;
-        };
+        const auto other = gather4(velocity_.data(), pair.neighbor);
+        const auto other_stretch = gather4(stretch_.data(), pair.neighbor);
+        const auto other_shear = gather3(shear_.data(), pair.neighbor);
+        // only the symmetric part of G has a say in x . G x
+        const B along_x = (other_stretch.x + stretch[0]) * pair.x + (other_shear.x + shear[0]) * pair.y,
+                along_y = (other_stretch.y + stretch[1]) * pair.y + (other_shear.z + shear[2]) * pair.z,
+                along_z = (other_stretch.z + stretch[2]) * pair.z + (other_shear.y + shear[1]) * pair.x;
         const B half(Scalar(0.5));
-        const B residual = (velocity_[own] - other.x - half * along(0)) * pair.x +
-                           (velocity_[own + 1] - other.y - half * along(1)) * pair.y +
-                           (velocity_[own + 2] - other.z - half * along(2)) * pair.z;
+        const B residual = (velocity[0] - other.x - half * along_x) * pair.x +
+                           (velocity[1] - other.y - half * along_y) * pair.y +
+                           (velocity[2] - other.z - half * along_z) * pair.z;
         const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
-        const B nu = viscosity_[static_cast<std::size_t>(i)] + gather(viscosity_.data(), pair.neighbor);
-        const B push = nu * gather(mass, pair.neighbor) * residual * slope / (pair.distance_squared + softening);
+        const B nu = velocity[3] + other.w;
+        const B push = nu * other_stretch.w * residual * slope / (pair.distance_squared + softening);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
@@ -84,16 +85,20 @@ struct ResidualViscosity {
   }
 
  private:
+  /// And how viscous each particle is.
   template <class Step>
-  void compute_coefficients(const Step& step) noexcept {
+  void note_velocities(const Step& step) noexcept {
     // three quarters of what an explicit step of the pair operator stands on a lattice, see Viscosity
     const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
     const Scalar most = Scalar(0.75) * Scalar(0.3) / (step.time_step * stiffness);
-    viscosity_.resize(static_cast<std::size_t>(step.fluid.size()));
+    velocity_.resize(4 * static_cast<std::size_t>(step.fluid.size()));
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      Scalar* const record = &velocity_[4 * static_cast<std::size_t>(i)];
+      record[0] = step.fluid.velocity(0, i);
+      record[1] = step.fluid.velocity(1, i);
+      record[2] = step.fluid.velocity(2, i);
       const Scalar head = std::max(step.fluid.pressure[i], Scalar(0)) / step.rest_density;
-      viscosity_[static_cast<std::size_t>(i)] =
-          std::min(most, std::max(numerical_viscosity, pressure_share * step.spacing * std::sqrt(head)));
+      record[3] = std::min(most, std::max(numerical_viscosity, pressure_share * step.spacing * std::sqrt(head)));
     });
   }
 
@@ -103,15 +108,8 @@ struct ResidualViscosity {
     using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
-    velocity_.resize(4 * static_cast<std::size_t>(count));
-    for (auto& rows : gradient_) {
-      rows.resize(4 * static_cast<std::size_t>(count));
-    }
-    parallel_for(count, step.threads, [&](Index i) {
-      for (Index axis = 0; axis < 3; ++axis) {
-        velocity_[static_cast<std::size_t>(4 * i + axis)] = step.fluid.velocity(axis, i);
-      }
-    });
+    stretch_.resize(4 * static_cast<std::size_t>(count));
+    shear_.resize(4 * static_cast<std::size_t>(count));
     const Scalar* mass = step.fluid.mass.data();
     parallel_for(count, step.threads, [&](Index i) {
       const auto own = 4 * static_cast<std::size_t>(i);
@@ -145,20 +143,24 @@ struct ResidualViscosity {
           }
         }
       }
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Vector3<Scalar> row = step.correction.apply(i, sums[axis]);
-        Scalar* record = &gradient_[axis][own];
-        record[0] = row[0];
-        record[1] = row[1];
-        record[2] = row[2];
-        record[3] = 0;
-      }
+      const Vector3<Scalar> x = step.correction.apply(i, sums[0]), y = step.correction.apply(i, sums[1]),
+                            z = step.correction.apply(i, sums[2]);
+      Scalar *const stretch = &stretch_[own], *const shear = &shear_[own];
+      stretch[0] = x[0];
+      stretch[1] = y[1];
+      stretch[2] = z[2];
+      stretch[3] = mass[i];
+      shear[0] = x[1] + y[0];
+      shear[1] = x[2] + z[0];
+      shear[2] = y[2] + z[1];
+      shear[3] = 0;
     });
   }
 
-  std::vector<Scalar> viscosity_{};                ///< nu of each particle
-  std::vector<Scalar> velocity_{};                 ///< records of four, the last one unused
-  std::array<std::vector<Scalar>, 3> gradient_{};  ///< row by row of G, records of four
+  // records of four
+  std::vector<Scalar> velocity_{};  ///< and nu
+  std::vector<Scalar> stretch_{};   ///< G_xx, G_yy, G_zz and the mass
+  std::vector<Scalar> shear_{};     ///< G_xy + G_yx, G_xz + G_zx, G_yz + G_zy and nothing
 };
 
 }  // namespace decant
