@@ -30,9 +30,9 @@ class WallShield {
       return;
     }
     note_walls(walls, neighbors.size(), threads);
-    neighbors.remove_if([&](Index i) { return walls.contact_count[i] > 0 && any_suspect(neighbors, i); },
+    neighbors.remove_if([&](Index i) { return any_suspect(neighbors, i); },
                         [&](Index i, Index j, const Vector3<Scalar>& from_j_to_i) {
-                          if (walls.contact_count[j] == 0 || !may_be_separated(i, j, from_j_to_i)) {
+                          if (!may_be_separated(i, j, from_j_to_i)) {
                             return false;
                           }
                           // the same question from both ends, so that pairs stay symmetric
@@ -61,7 +61,8 @@ class WallShield {
     });
   }
 
-  /// Whether what is `x` [m] away from a particle lies behind the plane that touches the wall nearest to it.
+  /// Whether what is `x` [m] away from a particle lies behind the plane that touches the wall nearest to it. False
+  /// where no wall is felt.
   template <class Number>
   static auto behind_wall(const Number& into_x, const Number& into_y, const Number& into_z, const Number& distance,
                           const Number& x, const Number& y, const Number& z) noexcept {
