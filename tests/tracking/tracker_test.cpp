@@ -114,7 +114,8 @@ TEST_CASE("tracker: gaps between particles are closed from near and far, those b
   film.dust.resize(128);
   for (Index i = 0; i < film.dust.size(); ++i) {
     const double side = i < 64 ? -8.5 : 1.5;
-    film.dust.position.col(i) = Vector3<double>(i % 8 + side, 0, i % 64 / 8 - 3.5) * apart;
+    film.dust.position.col(i) =
+        Vector3<double>(static_cast<double>(i % 8) + side, 0, static_cast<double>(i % 64 / 8) - 3.5) * apart;
   }
   TrackerSettings settings;
   settings.sphere_in_spacings = 0.4;  // does not reach the next particle
