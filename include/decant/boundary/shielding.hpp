@@ -14,7 +14,7 @@
 
 namespace decant {
 
-/// Takes out of a neighbour list the pairs that a body's wall separates. Of a thousand pairs near walls hardly one is,
+/// Takes out of a neighbour list the pairs that a body's wall separates. Few pairs near walls are,
 /// so what walls do to particles (WallState) answers two cheap questions first, a batch of neighbours at a time: a pair
 /// that a wall separates is farther apart than both are from walls, and one of the two is behind the plane that touches
 /// the wall nearest to the other. Only then rays are sent to the surface.

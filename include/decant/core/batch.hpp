@@ -62,59 +62,60 @@ struct BatchMask {
     if constexpr (one_bit_per_lane) {
       return {count >= static_cast<std::size_t>(Width) ? all_bits : (std::uint32_t{1} << count) - 1};
     } else {
-      using Integer = std::remove_cvref_t<decltype(Lanes{}[0])>;
-      const Integer limit = static_cast<Integer>(count < Width ? count : static_cast<std::size_t>(Width));
-      return {[&]<std::size_t... lane>(std::index_sequence<lane...>){return Lanes{static_cast<Integer>(lane)...} <
-                                                                            Lanes{((void)lane, limit)...};
+      return first(count, std::make_index_sequence<static_cast<std::size_t>(Width)>{});
     }
-    (std::make_index_sequence<static_cast<std::size_t>(Width)>{})
-  };
-}
-}  // namespace decant
+  }
 
-/// Bit k says what lane k says.
-[[gnu::always_inline]] std::uint32_t bits() const noexcept {
-  if constexpr (one_bit_per_lane) {
-    return lanes;
-  } else {
+  /// Bit k says what lane k says.
+  [[gnu::always_inline]] std::uint32_t bits() const noexcept {
+    if constexpr (one_bit_per_lane) {
+      return lanes;
+    } else {
 #if defined(__AVX2__)
-    if constexpr (sizeof(Lanes) == 32 && sizeof(Scalar) == 4) {
-      return static_cast<std::uint32_t>(_mm256_movemask_ps(std::bit_cast<__m256>(lanes)));
-    } else if constexpr (sizeof(Lanes) == 32) {
-      return static_cast<std::uint32_t>(_mm256_movemask_pd(std::bit_cast<__m256d>(lanes)));
-    }
+      if constexpr (sizeof(Lanes) == 32 && sizeof(Scalar) == 4) {
+        return static_cast<std::uint32_t>(_mm256_movemask_ps(std::bit_cast<__m256>(lanes)));
+      } else if constexpr (sizeof(Lanes) == 32) {
+        return static_cast<std::uint32_t>(_mm256_movemask_pd(std::bit_cast<__m256d>(lanes)));
+      }
 #endif
 #if defined(__SSE2__)
-    if constexpr (sizeof(Lanes) == 16 && sizeof(Scalar) == 4) {
-      return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(lanes)));
-    } else if constexpr (sizeof(Lanes) == 16) {
-      return static_cast<std::uint32_t>(_mm_movemask_pd(std::bit_cast<__m128d>(lanes)));
-    }
+      if constexpr (sizeof(Lanes) == 16 && sizeof(Scalar) == 4) {
+        return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(lanes)));
+      } else if constexpr (sizeof(Lanes) == 16) {
+        return static_cast<std::uint32_t>(_mm_movemask_pd(std::bit_cast<__m128d>(lanes)));
+      }
 #endif
-    std::uint32_t result = 0;
-    for (int lane = 0; lane < Width; ++lane) {
-      result |= static_cast<std::uint32_t>(lanes[lane] & 1) << lane;
+      std::uint32_t result = 0;
+      for (int lane = 0; lane < Width; ++lane) {
+        result |= static_cast<std::uint32_t>(lanes[lane] & 1) << lane;
+      }
+      return result;
     }
-    return result;
   }
-}
 
-bool operator[](int lane) const noexcept { return ((bits() >> lane) & 1u) != 0; }
+  bool operator[](int lane) const noexcept { return ((bits() >> lane) & 1u) != 0; }
 
-[[gnu::always_inline]] friend BatchMask operator&(BatchMask a, BatchMask b) noexcept { return {a.lanes & b.lanes}; }
-[[gnu::always_inline]] friend BatchMask operator|(BatchMask a, BatchMask b) noexcept { return {a.lanes | b.lanes}; }
-[[gnu::always_inline]] friend BatchMask operator!(BatchMask a) noexcept {
-  if constexpr (one_bit_per_lane) {
-    return {~a.lanes & all_bits};
-  } else {
-    return {~a.lanes};
+  [[gnu::always_inline]] friend BatchMask operator&(BatchMask a, BatchMask b) noexcept { return {a.lanes & b.lanes}; }
+  [[gnu::always_inline]] friend BatchMask operator|(BatchMask a, BatchMask b) noexcept { return {a.lanes | b.lanes}; }
+  [[gnu::always_inline]] friend BatchMask operator!(BatchMask a) noexcept {
+    if constexpr (one_bit_per_lane) {
+      return {~a.lanes & all_bits};
+    } else {
+      return {~a.lanes};
+    }
   }
-}
-friend bool any(BatchMask a) noexcept { return a.bits() != 0; }
-friend bool all(BatchMask a) noexcept { return a.bits() == all_bits; }
-friend int count(BatchMask a) noexcept { return std::popcount(a.bits()); }
-}
-;
+  friend bool any(BatchMask a) noexcept { return a.bits() != 0; }
+  friend bool all(BatchMask a) noexcept { return a.bits() == all_bits; }
+  friend int count(BatchMask a) noexcept { return std::popcount(a.bits()); }
+
+ private:
+  template <std::size_t... lane>
+  [[gnu::always_inline]] static BatchMask first(std::size_t count, std::index_sequence<lane...>) noexcept {
+    using Integer = std::remove_cvref_t<decltype(Lanes{}[0])>;
+    const Integer limit = static_cast<Integer>(count < sizeof...(lane) ? count : sizeof...(lane));
+    return {Lanes{static_cast<Integer>(lane)...} < Lanes{((void)lane, limit)...}};
+  }
+};
 
 /// `width` numbers that every operation treats alike. A scalar stands for a batch of equal numbers, so that formulas
 /// mix the two. The width is part of the type: code built for different processors does not share symbols.

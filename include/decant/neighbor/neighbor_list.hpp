@@ -119,6 +119,7 @@ class NeighborList {
     }
   }
 
+  /// Where particle i was when the list was built [m].
   Vector3<Scalar> position(Index i) const noexcept {
     const Scalar* const record = records_.data() + 4 * i;
     return {record[0], record[1], record[2]};

@@ -45,6 +45,8 @@ class CoarseCells {
         cell = static_cast<std::uint32_t>(std::lower_bound(keys_.begin(), keys_.end(), key_[i]) - keys_.begin());
       }
       cell_[i] = cell;
+      // Which of the eight cells of its group: the lowest bits of the cell's three numbers, which the key has side by
+      // side.
       slot_[i] = static_cast<std::uint8_t>((key_[i] >> 40 & 4) | (key_[i] >> 20 & 2) | (key_[i] & 1));
       ++begin_[cell + 1];
     }

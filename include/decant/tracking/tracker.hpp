@@ -335,7 +335,7 @@ class Tracker {
     std::size_t count = 0;
     for (Index i = 0; i < position.cols(); i += 1 + position.cols() / static_cast<Index>(scale.size())) {
       const double both_ways = camera.jacobian(position.col(i).template cast<double>()).squaredNorm();
-      if (both_ways > 0) {
+      if (both_ways > 0 && std::isfinite(both_ways)) {
         scale[count++] = std::sqrt(0.5 * both_ways);
       }
     }
