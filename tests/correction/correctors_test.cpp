@@ -7,6 +7,7 @@
 #include <memory>
 
 #include <decant/boundary/shapes.hpp>
+#include <decant/correction/edge_fit.hpp>
 #include <decant/correction/map_filter.hpp>
 #include <decant/correction/map_filter_schenck2017.hpp>
 #include <decant/correction/mass_relocation.hpp>
@@ -46,7 +47,9 @@ decant::CorrectionReport correct(CorrectorType& corrector, decant::FluidState<Sc
       views.push_back(eye->predict(fluid));
     }
     const auto report = corrector.correct(
-        fluid, {views, pass, decant_test::block_spacing, Vector3<double>(0, 0, -9.81), threads}, Scalar(1.0 / 30));
+        fluid,
+        {views, pass, decant_test::block_spacing, decant_test::block_radius, Vector3<double>(0, 0, -9.81), threads},
+        Scalar(1.0 / 30));
     all.moved += report.moved;
     all.mean_shift += report.mean_shift;
   }
@@ -139,6 +142,7 @@ TEST_CASE("correctors: the same bits for any number of threads") {
     REQUIRE((first.position != untouched.position || first.velocity != untouched.velocity));
   };
   require_same([] { return decant::TransportCorrector<>(); });
+  require_same([] { return decant::EdgeFit<>(); });
   require_same([] { return decant::SilhouetteCorrector<>(); });
   require_same([] { return decant::MapFilter<>(); });
   require_same([] { return decant::MapFilterSchenck2017<>(); });
@@ -200,7 +204,8 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   eye.observed.block(70, 130, 10, 10).setConstant(decant::mask_liquid);  // right of the particle, a little above it
   decant::MapFilterSchenck2017<double> filter;
   const auto views = std::array{eye.predict(fluid)};
-  const auto report = filter.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  const auto report =
+      filter.correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
   CHECK(report.moved == 1);
   // by hand: of all places the one whose pixel is nearest to the patch, so right, up, and nearer to the camera, where a
   // step of 5 mm takes more pixels
@@ -213,7 +218,7 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   eye.sight.add(std::make_shared<const decant::BoundingVolumeHierarchy>(
       decant::Box{{0.002, -0.02, -0.1}, {0.003, 0.1, 0.1}}.mesh()));
   const auto walled = std::array{eye.predict(fluid)};
-  filter.correct(fluid, {walled, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  filter.correct(fluid, {walled, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
   CHECK(fluid.position(0, 0) <= 0);
   CHECK(fluid.position(2, 0) == Approx(0.005));
 
@@ -221,7 +226,8 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   fluid.position.col(0) << 0, 0, 0;
   eye.observed.setZero();
   const auto blind = std::array{eye.predict(fluid)};
-  CHECK(filter.correct(fluid, {blind, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30).moved == 0);
+  CHECK(filter.correct(fluid, {blind, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30)
+            .moved == 0);
 }
 
 TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is felt by hidden neighbours") {
@@ -240,7 +246,7 @@ TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is
   eye.drawing.render(fluid.position, eye.hidden, eye.sight.camera().camera(), eye.sight.camera().camera_from_world(),
                      eye.predicted);
   const auto views = std::array{view};
-  field.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 0.5);
+  field.correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 0.5);
   // the sum by hand: one pixel, u = (30.5, -0.5) px, not covered; a pixel is a millimetre
   const double u = 30.5, v = -0.5, weight = std::exp(-(u * u + v * v) / (33 * 33));
   const double h = 2 * 0.005 / decant::CubicSpline<double>::support_factor, volume = std::pow(0.005, 3);
@@ -266,7 +272,8 @@ TEST_CASE("mass relocation: fills what is seen two frames running from what is n
   CHECK(correct(relocation, fluid, std::array{&eye}).moved == 0);  // seen once: may be noise
   CHECK(fluid.position == start.position);
   auto views = std::array{eye.predict(fluid)};
-  const auto report = relocation.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0f / 30);
+  const auto report = relocation.correct(
+      fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0f / 30);
   CHECK(report.relocated > 5);
   CHECK(report.relocated <= 20);  // 4 % of 512
   Index changed = 0;
@@ -341,7 +348,9 @@ TEST_CASE("mass relocation: liquid that comes into sight where none is simulated
   decant::MassRelocation<double> relocation;
   correct(relocation, fluid, std::array{&eye});
   const auto views = std::array{eye.predict(fluid)};
-  REQUIRE(relocation.correct(fluid, {views, 0, 0.005, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30).relocated >= 1);
+  REQUIRE(relocation
+              .correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30)
+              .relocated >= 1);
   const double bottom = start.position.row(2).minCoeff();
   for (Index i = 0; i < fluid.size(); ++i) {
     if (fluid.position.col(i) != start.position.col(i)) {
@@ -360,8 +369,10 @@ TEST_CASE("correctors: their laws") {
   wrong.observe(liquid_block<float>({0.01, 0, 0.004}));
   const auto seen_right = std::array{right.predict(fluid)}, seen_wrong = std::array{wrong.predict(fluid)};
   const Vector3<double> gravity(0, 0, -9.81);
-  const decant::Silhouettes<decant::DistortedPinholeCamera> nothing{{}, 0, 0.005, gravity, {1}},
-      perfect{seen_right, 0, 0.005, gravity, {1}}, other{seen_wrong, 0, 0.005, gravity, {1}};
+  const decant::Silhouettes<decant::DistortedPinholeCamera> nothing{{},      0,  0.005, decant_test::block_radius,
+                                                                    gravity, {1}},
+      perfect{seen_right, 0, 0.005, decant_test::block_radius, gravity, {1}},
+      other{seen_wrong, 0, 0.005, decant_test::block_radius, gravity, {1}};
   const double anywhere = std::numeric_limits<double>::infinity();
   const auto require_laws = [&](const auto& corrector, double still) {
     for (const auto& law :
@@ -373,6 +384,7 @@ TEST_CASE("correctors: their laws") {
   require_laws(decant::OpenLoop<>(), 0);
   require_laws(decant::TransportCorrector<>(), 1e-4);  // a tenth of a pixel
   require_laws(decant::MassRelocation<>(), 0);
+  require_laws(decant::EdgeFit<>(), 0);
   require_laws(decant::MapFilter<>(), 0);
   require_laws(decant::SilhouetteCorrector<>(), 1e-4);
   require_laws(decant::MapFilterSchenck2017<>(), anywhere);  // as printed, they move what is right

@@ -14,7 +14,7 @@
 
 namespace decant_test {
 
-inline constexpr double block_spacing = 0.005;
+inline constexpr double block_spacing = 0.005, block_radius = 0.66 * block_spacing;
 
 /// 8 x `deep` x 8 particles around `center` [m], at rest.
 template <class Scalar>
@@ -54,7 +54,7 @@ struct Eye {
   using Camera = decant::DistortedPinholeCamera;
 
   decant::RayOcclusion<Camera> sight;
-  decant::Silhouette<decant::DiscSplat<Scalar>> drawing{decant::DiscSplat<Scalar>(0.66 * block_spacing)};
+  decant::Silhouette<decant::DiscSplat<Scalar>> drawing{decant::DiscSplat<Scalar>(block_radius)};
   decant::Mask observed, predicted;
   std::vector<std::uint8_t> hidden{};
 

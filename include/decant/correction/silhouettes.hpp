@@ -37,6 +37,7 @@ struct Silhouettes {
   std::span<const SilhouetteView<Camera>> views{};
   int pass = 0;                          ///< 0 .. passes - 1: which of the corrector's passes this is
   double spacing = 0;                    ///< of particles [m]
+  double radius = 0;                     ///< with which particles are drawn [m]
   Vector3<double> gravity{0, 0, -9.81};  ///< [m/s^2]
   Threads threads{};
 };

@@ -375,6 +375,7 @@ class Tracker {
 
   void correct(double duration, FrameReport& report) noexcept {
     FluidState<Scalar>& fluid = model_.fluid();
+    const double radius = settings_.sphere_in_spacings * model_.spacing();
     double distance = 0;
     for (int pass = 0; pass < passes(); ++pass) {
       before_ = fluid.position;
@@ -384,8 +385,9 @@ class Tracker {
         for (SilhouetteView<Camera>& view : views_) {
           view.hidden = eyes_[view.number].hidden;
         }
-        moves = corrector_.correct(fluid, {views_, pass, model_.spacing(), settings_.gravity, settings_.threads},
-                                   static_cast<Scalar>(duration));
+        moves =
+            corrector_.correct(fluid, {views_, pass, model_.spacing(), radius, settings_.gravity, settings_.threads},
+                               static_cast<Scalar>(duration));
       }
       if (moves.moved + moves.relocated == 0) {
         continue;  // the silhouette is still right for the next pass

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// EdgeFit on single discs before straight edges, where the right move is known, and on a block of liquid.
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <decant/correction/edge_fit.hpp>
+#include <decant/tracking/overlap.hpp>
+
+#include "catch.hpp"
+#include "correction/seen.hpp"
+
+using decant::Index;
+using decant::Vector3;
+using decant_test::Eye;
+using decant_test::liquid_block;
+
+namespace {
+
+// A disc of 20 px in the middle of the image: half a metre away, a pixel is 1 mm.
+constexpr double radius = 0.02, spacing = 0.03;
+
+decant::FluidState<double> one_particle() {
+  decant::FluidState<double> fluid;
+  fluid.resize(1);
+  fluid.position.col(0).setZero();
+  fluid.mass[0] = 1e-3;
+  return fluid;
+}
+
+struct OneDisc {
+  decant::FluidState<double> fluid = one_particle();
+  Eye<double> eye{decant_test::before_the_block()};
+
+  OneDisc() { eye.drawing = decant::Silhouette<decant::DiscSplat<double>>(decant::DiscSplat<double>(radius)); }
+
+  /// One call, with liquid observed where inside(u, v) in pixels from the middle of the image. Returns the move [px].
+  template <class Inside>
+  Eigen::Vector2d move(const decant::EdgeFitSettings& settings, Inside inside) {
+    for (Index v = 0; v < eye.observed.rows(); ++v) {
+      for (Index u = 0; u < eye.observed.cols(); ++u) {
+        const bool liquid = inside(static_cast<double>(u) - 99.5, static_cast<double>(v) - 79.5);
+        eye.observed(v, u) = liquid ? decant::mask_liquid : std::uint8_t(0);
+      }
+    }
+    const auto views = std::array{eye.predict(fluid)};
+    decant::EdgeFit<double> fit(settings);
+    fit.correct(fluid, {views, 0, spacing, radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+    CHECK(fluid.velocity.isZero(0));
+    CHECK(fluid.position(1, 0) == Approx(0).margin(1e-6));  // never in depth
+    return 1e3 * Eigen::Vector2d(fluid.position(0, 0), -fluid.position(2, 0));
+  }
+};
+
+decant::EdgeFitSettings whole_moves(double push, double pull) {
+  decant::EdgeFitSettings settings;
+  settings.push = push;
+  settings.pull = pull;
+  return settings;
+}
+
+}  // namespace
+
+TEST_CASE("edge fit: a disc that sticks out by so much is pushed back by so much, at right angles to the edge") {
+  for (const double depth : {1.0, 3.0, 8.0}) {
+    for (const double angle : {0.0, 0.6, 2.5}) {
+      const Eigen::Vector2d out(std::cos(angle), std::sin(angle));
+      OneDisc disc;
+      const Eigen::Vector2d move =
+          disc.move(whole_moves(1, 0), [&](double u, double v) { return out.dot(Eigen::Vector2d(u, v)) < 20 - depth; });
+      INFO("depth " << depth << " angle " << angle << " move " << move.transpose());
+      CHECK(-out.dot(move) == Approx(depth).margin(0.6));  // pixels are whole
+      CHECK(std::abs(out.x() * move.y() - out.y() * move.x()) < 0.3);
+    }
+  }
+}
+
+TEST_CASE("edge fit: a disc that sticks out on both sides stays") {
+  OneDisc disc;
+  CHECK(disc.move(whole_moves(1, 0), [](double u, double) { return std::abs(u) < 15; }).norm() < 1e-9);
+}
+
+TEST_CASE("edge fit: observed pixels that no disc covers pull the disc next to them") {
+  OneDisc disc;
+  // a bay beyond the disc's rim, from 20 to 22.5 px from its centre: its pixels' distances are 0.5 to 2.5 + 0.5 px
+  const Eigen::Vector2d move = disc.move(whole_moves(0, 1), [](double u, double v) {
+    return u * u + v * v <= 400 || (u > 0 && std::abs(v) < 3 && u < 22.5);
+  });
+  CHECK(move.x() == Approx(1.7).margin(0.4));
+  CHECK(std::abs(move.y()) < 0.1);
+}
+
+TEST_CASE("edge fit: what is beyond its reach, and single pixels, hardly count") {
+  OneDisc far, single;
+  CHECK(far.move(whole_moves(0, 1),
+                 [](double u, double v) { return u * u + v * v <= 400 || (std::abs(v) < 3 && u > 25); })
+            .norm() < 1e-9);
+  CHECK(single
+            .move(whole_moves(0, 1),
+                  [](double u, double v) { return u * u + v * v <= 400 || (u > 20 && u < 21 && v > 0 && v < 1); })
+            .norm() < 0.45);  // a third of what many such pixels would do
+}
+
+TEST_CASE("edge fit: no move is longer than its limit") {
+  OneDisc disc;
+  auto settings = whole_moves(1, 0);
+  settings.longest_in_spacings = 0.05;
+  const double move = disc.move(settings, [](double u, double) { return u < 10; }).norm();
+  CHECK(move == Approx(1e3 * 0.05 * spacing).epsilon(1e-6));
+}
+
+TEMPLATE_TEST_CASE("edge fit: takes away most of what a block's silhouette is off by a pixel", "", float, double) {
+  auto fluid = liquid_block<TestType>({0, 0, 0});
+  Eye<TestType> eye(decant_test::before_the_block());
+  eye.observe(liquid_block<TestType>({0.001, 0, -0.0007}));
+  decant::EdgeFit<TestType> fit;
+  const auto start = fluid;
+  const auto wrong = [&] { return decant::overlap(eye.predicted, eye.observed).differing_px(); };
+  eye.predict(fluid);
+  const auto before = wrong();
+  for (int pass = 0; pass < 4; ++pass) {
+    const auto views = std::array{eye.predict(fluid)};
+    fit.correct(fluid, {views, pass, decant_test::block_spacing, decant_test::block_radius, {0, 0, -9.81}, {1}},
+                TestType(1.0 / 30));
+  }
+  eye.predict(fluid);
+  INFO(before << " px before, " << wrong() << " px after");
+  CHECK(wrong() < before / 3);
+  CHECK((fluid.position - start.position).colwise().norm().maxCoeff() < TestType(0.004));
+}
+
+TEST_CASE("edge fit: settings are checked") {
+  CHECK_THROWS_WITH(decant::EdgeFit<>({.push = 1.5}), decant_test::contains("push must be 0 .. 1, got 1.5"));
+  CHECK_THROWS_WITH(decant::EdgeFit<>({.pull = std::nan("")}), decant_test::contains("pull must be 0 .. 1"));
+  CHECK_THROWS_WITH(decant::EdgeFit<>({.reach_px = 0}), decant_test::contains("reach_px must be > 0, got 0"));
+  CHECK_THROWS_WITH(decant::EdgeFit<>({.longest_in_spacings = -1}), decant_test::contains("longest_in_spacings"));
+}
