@@ -120,10 +120,12 @@ TEST_CASE("dam break front follows Martin and Moyce, 2.25 in", "[slow]") {
 }
 
 TEST_CASE("dam break front follows Martin and Moyce, 1.125 in", "[slow]") {
-  // the small column is slowed by friction and surface tension, which are not simulated: 12.4 % at the worst point
+  // The small column is slowed by friction and surface tension, which are not simulated: 4.6 % in the mean and 12.4 %
+  // at the worst point, which is beyond the 12 % that the larger column keeps to.
   const Misfit found = front_misfit("dambreak_martin_moyce/front_a_1p125in.csv", 0.028575, 24, 10);
   CAPTURE(found.mean, found.worst);
   CHECK(found.mean < 0.05);
+  CHECK(found.worst < 0.135);
 }
 
 TEST_CASE("dam break levels follow Lobovsky and others until the wave returns", "[slow]") {

@@ -18,6 +18,7 @@ struct Momentum {
   Vector linear = Vector::Zero(), angular = Vector::Zero(), center = Vector::Zero();
 };
 
+/// Angular momentum about the origin.
 Momentum momentum_of(const decant::FluidState<double>& fluid) {
   Momentum momentum;
   for (Index i = 0; i < fluid.size(); ++i) {
@@ -30,7 +31,7 @@ Momentum momentum_of(const decant::FluidState<double>& fluid) {
 }
 
 template <class Parts>
-decant::Simulator<Parts> drop(const Vector& gravity, double step) {
+decant::Simulator<Parts> drop(const Vector& gravity, double step, unsigned seed = 2) {
   decant::SimulatorSettings settings;
   settings.spacing = 0.005;
   settings.gravity = gravity;
@@ -38,7 +39,7 @@ decant::Simulator<Parts> drop(const Vector& gravity, double step) {
   settings.threads = {1};
   decant::Simulator<Parts> simulator(settings);
   const auto cube = decant_test::block<double>({-0.03, -0.03, -0.03}, 12, 12, 12, settings.spacing, 0.1);
-  std::mt19937 random(2);
+  std::mt19937 random(seed);
   std::normal_distribution<double> speed(0, 0.05);
   for (Index i = 0; i < cube.cols(); ++i) {
     const Vector x = cube.col(i);
@@ -61,6 +62,24 @@ TEST_CASE("a drop without gravity keeps its linear momentum to rounding") {
   }
   const Momentum after = momentum_of(simulator.fluid());
   CHECK((after.linear - before.linear).norm() < 1e-12 * before.linear.norm());
+}
+
+TEST_CASE("a drop without gravity keeps its angular momentum to 0.4 % in 0.2 s") {
+  // Not to rounding: what sets places right (Dfsph) moves particles without their speed. About the centre 0.26 to
+  // 0.32 % (four seeds, spacings of 3.5, 5 and 7 mm, steps of 0.5 and 1 ms), all of it before the drop has come loose.
+  for (const unsigned seed : {2u, 3u}) {
+    auto simulator = drop<decant::DefaultParts<double>>(Vector::Zero(), 0.001, seed);
+    const auto spin = [&] {
+      const Momentum momentum = momentum_of(simulator.fluid());
+      return Vector(momentum.angular - momentum.center.cross(momentum.linear));
+    };
+    const Vector before = spin();
+    for (int frame = 0; frame < 20; ++frame) {
+      REQUIRE(simulator.step(0.01).advanced());
+      CAPTURE(seed, frame);
+      CHECK((spin() - before).norm() < 4e-3 * before.norm());
+    }
+  }
 }
 
 TEST_CASE("a weakly compressible drop without gravity keeps linear and angular momentum to rounding") {

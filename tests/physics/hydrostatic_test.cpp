@@ -116,8 +116,7 @@ void require_at_rest(const Reading& reading, double spacing) {
   // grow
   CHECK(reading.late_energy <= 1.25 * reading.early_energy);
   const double mass = 998.2 * width * width * spacing * spacing * depth;
-  CHECK(std::sqrt(2 * reading.late_energy / mass) < 0.02);
-  CHECK(reading.largest_density_error <= 1e-3);
+  CHECK(std::sqrt(2 * reading.late_energy / mass) < 0.01);  // 4 to 6 mm/s at 5, 10 and 20 mm and in 10 s
   CHECK(reading.always_converged);
 }
 
@@ -165,16 +164,69 @@ TEST_CASE("a column of eighty layers carries its own weight") {
   CHECK(iterations < 20 * sub_steps);
 }
 
-TEST_CASE("position-based: water 16 layers deep that was filled into a cup stays at rest") {
+namespace {
+
+struct Rest {
+  double speed = 0;        // root mean square over particles and frames [m/s]
+  double compression = 0;  // mean over particles, over rest density, largest of the frames
+};
+
+/// Position-based water that fills nine tenths of a container, watched from then on.
+Rest watch_position_based(const decant::TriangleMesh& mesh, double spacing, double seconds) {
   decant::SimulatorSettings settings;
-  settings.spacing = 0.005;
+  settings.spacing = spacing;
   settings.threads = {1};
   decant::Simulator<decant::PositionBasedParts<float>> simulator(settings);
-  const decant::BodyId cup = simulator.add_body("cup", decant::Cup{0.032, 0.041, 0.09, 0.003}.mesh());
-  decant::fill(simulator, cup, decant::FillAmount::fraction(0.9));
-  REQUIRE(simulator.step(1).advanced());
-  const auto count = static_cast<float>(simulator.fluid().size());
-  const double mean_square = static_cast<double>(simulator.fluid().velocity.cwiseAbs2().sum() / count);
+  const decant::BodyId container = simulator.add_body("container", mesh);
+  decant::fill(simulator, container, decant::FillAmount::fraction(0.9));
+  Rest rest;
+  const int frames = static_cast<int>(std::lround(seconds / 0.02));
+  double square = 0;
+  for (int frame = 0; frame < frames; ++frame) {
+    const auto report = simulator.step(0.02);
+    REQUIRE(report.advanced());
+    square += 2 * report.kinetic_energy / (settings.liquid.density * report.volume) / frames;
+    const double compression = decant_test::mean_over(simulator.fluid(), [&](Index i) {
+      return std::max(0.0, static_cast<double>(simulator.fluid().density[i]) / settings.liquid.density - 1);
+    });
+    rest.compression = std::max(rest.compression, compression);
+  }
+  rest.speed = std::sqrt(square);
+  return rest;
+}
+
+}  // namespace
+
+TEST_CASE("position-based: water 16 layers deep that was filled into a cup stays at rest") {
+  const double spacing = 0.005;
+  const Rest rest = watch_position_based(decant::Cup{0.032, 0.041, 0.09, 0.003}.mesh(), spacing, 1);
+  CAPTURE(rest.speed, rest.compression);
   // a tenth of the speed of a fall by one spacing; with a recovery of 1, it is 40 cm/s and rising
-  CHECK(std::sqrt(mean_square) < 0.1 * std::sqrt(2 * 9.81 * settings.spacing));
+  CHECK(rest.speed < 0.1 * std::sqrt(2 * 9.81 * spacing));
+  // Few sweeps do not reach the bottom of many layers: 1.1 %, and 1.2 % at 4 mm.
+  CHECK(rest.compression < 0.015);
+}
+
+TEST_CASE("position-based: water 34 layers deep in a bottle hardly comes to rest", "[slow]") {
+  // inner outline from the floor to the mouth, then back outside, 3 mm thick
+  const decant::TriangleMesh bottle = decant::Revolved{
+      {{0, -0.003},
+       {0.034, -0.003},
+       {0.036, 0.004},
+       {0.036, 0.085},
+       {0.033, 0.098},
+       {0.024, 0.112},
+       {0.021, 0.14},
+       {0.018, 0.14},
+       {0.018, 0.12},
+       {0.021, 0.112},
+       {0.030, 0.098},
+       {0.033, 0.085},
+       {0.033, 0.004},
+       {0.031, 0},
+       {0, 0}}}.mesh();
+  const Rest rest = watch_position_based(bottle, 0.0037, 0.4);
+  CAPTURE(rest.speed, rest.compression);
+  CHECK(rest.speed < 0.2);         // 5 to 14 cm/s from frame to frame, 10 in all of a second; 2 to 12 in a cup at 4 mm
+  CHECK(rest.compression < 0.02);  // 1.6 % at worst in a second
 }
