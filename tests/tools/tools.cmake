@@ -104,6 +104,46 @@ elseif(CASE STREQUAL "replay_motion_refuses_a_missing_file")
   run(2 --poses missing.csv --heights missing.csv --radius-mm 49 --depth-mm 78 --json out.json)
   expect_one_line("${errors}" "missing.csv")
 
+elseif(CASE STREQUAL "slosh_all_motions_sums_up")
+  # a program in place of replay_motion that knows its answers, and writes down that it was called
+  file(WRITE "${SCRATCH}/replay" "#!/usr/bin/env bash
+while (($# > 0)); do
+  case $1 in --poses) poses=$2 ;; --json) json=$2 ;; esac
+  shift
+done
+case $poses in *pose_LE*) peak=12 ;; *pose_Tilt*) peak=7 ;; *) peak=9 ;; esac
+if [[ $poses == *broken* ]]; then peak=null; fi
+echo run >>calls
+printf '{\\n \"correlation\": 0.9%s,\\n' \"$peak\" >\"$json\"
+for key in time_shift_s decay_frequency_hz measured_frequency_hz damping_ratio measured_damping_ratio particles lost wall_s; do
+  printf ' \"%s\": 3,\\n' $key >>\"$json\"
+done
+printf ' \"measured_peak_mm\": 10.0,\\n \"peak_mm\": %s\\n}\\n' $peak >>\"$json\"
+")
+  file(CHMOD "${SCRATCH}/replay" PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE)
+  set(ENV{DECANT_REPLAY_MOTION} "${SCRATCH}/replay")
+  set(TOOL "${SOURCE}/benchmarks/slosh_all_motions.sh")
+  foreach(round IN ITEMS first second)  # the second finds all results
+    run(0 "${SOURCE}/examples/data" 6 results)
+    foreach(line IN ITEMS "LE_2D_0m_5s_900deg,no,12.0,10.0,[+]20.0" "Tilt_TRD_2D_0.3m_3.5s_30deg,yes,7.0,10.0,-30.0"
+            "all: 3 motions at 6 mm, peak off by 20.0 % in the median and 30.0 % at worst, correlation 0.970 in the median and 0.912"
+            "upright: 2 motions at 6 mm, peak off by 15.0 % in the median and 20.0 % at worst, correlation 0.951 in the median and 0.912")
+      if(NOT output MATCHES "${line}")
+        message(FATAL_ERROR "no line '${line}' in the ${round} run:\n${output}")
+      endif()
+    endforeach()
+  endforeach()
+  file(STRINGS "${SCRATCH}/calls" calls)
+  list(LENGTH calls count)
+  if(NOT count EQUAL 3)
+    message(FATAL_ERROR "three motions were replayed ${count} times")
+  endif()
+  file(WRITE "${SCRATCH}/broken/pose_broken.csv" "")
+  run(1 "${SCRATCH}/broken" 6 results)
+  expect_one_line("${errors}" "broken.*peak_mm")
+  run(2 "${SCRATCH}/nowhere" 6 results)
+  expect_one_line("${errors}" "nowhere")
+
 elseif(CASE STREQUAL "track_scores_a_recording")
   # coarse, 90 % full and short: that both tools work together; how well it tracks is for the benchmark
   execute_process(COMMAND "${RECORD}" --container cup --fill 0.9 --seed 3 --spacing-mm 7 --seconds 1.6 --out pour
