@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT
 // Workloads W1 to W3: a cube of n^3 particles of water collapses in a closed box, with the default simulator. Prints
-// one row of CSV per size and number of threads; errors are recomputed by brute force from the last snapshot. Usage:
-// bench_sweep_column_collapse [largest n = 40] [seconds of W1 = 2]
+// one row of CSV per size and number of threads: the whole run, and median and quartiles over its frames of what a
+// sub-step took; errors are recomputed by brute force from a snapshot of each frame. Usage:
+// bench_sweep_column_collapse [largest n = 100] [seconds of W1 = 2]
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 #include <decant/decant.hpp>
 
@@ -62,39 +64,46 @@ double mean_compression(const LiquidSimulator& simulator) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  const int largest = count > 1 ? std::atoi(arguments[1]) : 40;
+  const int largest = count > 1 ? std::atoi(arguments[1]) : 100;
   const double w1_seconds = count > 2 ? std::atof(arguments[2]) : 2;
   std::printf(
       "n,particles,threads,simulated_s,wall_s,wall_per_simulated,sub_steps,density_iterations,"
-      "divergence_iterations,ms_per_sub_step,us_per_particle_step,mean_compression,compiler,flags,cpu\n");
+      "divergence_iterations,ms_per_sub_step_median,ms_lower_quartile,ms_upper_quartile,us_per_particle_step,"
+      "mean_compression,compiler,flags,cpu\n");
   for (const int n : {10, 20, 40, 80, 100}) {
     for (const int threads : {1, 2}) {
       if (n > largest) {
         continue;
       }
       LiquidSimulator simulator = column(n, threads);
-      const double duration = n <= 20 ? w1_seconds : n <= 40 ? 0.1 : 0.05;
+      const double duration = n <= 20 ? w1_seconds : n <= 40 ? 0.1 : 0.05, frame = n <= 20 ? 0.02 : 0.01;
       int sub_steps = 0, density = 0, divergence = 0;
       double worst = 0, wall = 0;
+      std::vector<double> ms_per_sub_step;  // of each frame
       while (simulator.time() < duration - 1e-9) {
         const auto start = std::chrono::steady_clock::now();
-        const StepReport report = simulator.step(std::min(0.02, duration - simulator.time()));
-        wall += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        const StepReport report = simulator.step(std::min(frame, duration - simulator.time()));
+        const double took = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         if (!report.advanced()) {
           std::fprintf(stderr, "stopped: %s\n", to_string(report.status).data());
           return 1;
         }
+        wall += took;
+        ms_per_sub_step.push_back(1e3 * took / report.sub_steps);
         sub_steps += report.sub_steps;
         density += report.density_iterations;
         divergence += report.divergence_iterations;
         worst = std::max(worst, mean_compression(simulator));
       }
-      const double per_step = wall / sub_steps;
-      std::printf("%d,%ld,%d,%g,%.3f,%.3f,%d,%.2f,%.2f,%.3f,%.3f,%.2g,%s,%s,%s\n", n,
+      std::sort(ms_per_sub_step.begin(), ms_per_sub_step.end());
+      const auto quantile = [&](double share) {
+        return ms_per_sub_step[static_cast<std::size_t>(share * static_cast<double>(ms_per_sub_step.size() - 1) + 0.5)];
+      };
+      std::printf("%d,%ld,%d,%g,%.3f,%.3f,%d,%.2f,%.2f,%.3f,%.3f,%.3f,%.3f,%.2g,%s,%s,%s\n", n,
                   static_cast<long>(simulator.fluid().size()), threads, duration, wall, wall / duration, sub_steps,
-                  static_cast<double>(density) / sub_steps, static_cast<double>(divergence) / sub_steps, 1e3 * per_step,
-                  1e6 * per_step / static_cast<double>(simulator.fluid().size()), worst,
-                  decant_benchmark::compiler().c_str(), decant_benchmark::flags().c_str(),
+                  static_cast<double>(density) / sub_steps, static_cast<double>(divergence) / sub_steps, quantile(0.5),
+                  quantile(0.25), quantile(0.75), 1e3 * quantile(0.5) / static_cast<double>(simulator.fluid().size()),
+                  worst, decant_benchmark::compiler().c_str(), decant_benchmark::flags().c_str(),
                   decant_benchmark::processor().c_str());
       std::fflush(stdout);
     }
