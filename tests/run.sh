@@ -1,20 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: MIT
-# Installs what is missing, builds everything and runs every test but those labelled `long` (a quarter of an hour). Ends with the line `N passed, N failed`; the exit
-# status is 0 only if there are tests and all of them passed.
+# Installs what is missing, builds everything and runs every test but those labelled `long` (a quarter of an hour).
+# Ends with the line `N passed, N failed`; the exit status is 0 only if there are tests and all of them passed.
 # Environment: DECANT_TEST_JOBS, how many compilers and tests run side by side (all cores unless given);
-# DECANT_SHARED_DATA_DIR, a folder of measurements that some tests compare with; DECANT_BUILD_DIR, build/ unless given;
-# CI=true makes warnings errors and builds the benchmarks, too.
+# DECANT_SHARED_DATA_DIR, a folder of measurements that some tests compare with, ../shared/data if there is one;
+# DECANT_BUILD_DIR, build/ unless given; CI=true makes warnings errors and builds the benchmarks, too.
 # Arguments go to ctest instead: ./tests/run.sh -L long, ./tests/run.sh -LE 'slow|long'
 set -uo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 jobs=${DECANT_TEST_JOBS:-$(nproc)}
 build=${DECANT_BUILD_DIR:-build}
-measurements=${DECANT_SHARED_DATA_DIR:-}
-if [[ -z $measurements && -d ../shared/data ]]; then
-  measurements=$(cd ../shared/data && pwd)
-fi
 for_ci=OFF
 if [[ ${CI:-} == true ]]; then
   for_ci=ON
@@ -29,7 +25,7 @@ give_up() {
 ./cmake/install_dependencies.sh catch2 browser || give_up "The tests did not start."
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=ON -DDECANT_BUILD_EXAMPLES=ON \
   -DDECANT_BUILD_BENCHMARKS="$for_ci" -DDECANT_WARNINGS_AS_ERRORS="$for_ci" \
-  -DDECANT_SHARED_DATA_DIR="$measurements" || give_up "Configuring failed."
+  -DDECANT_SHARED_DATA_DIR="${DECANT_SHARED_DATA_DIR:-}" || give_up "Configuring failed."
 cmake --build "$build" --parallel "$jobs" || give_up "Building failed."
 
 if (($# == 0)); then

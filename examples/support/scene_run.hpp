@@ -24,6 +24,7 @@
 #include <decant/boundary/mesh_repair.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/fluid_state.hpp>
 #include <decant/io/liquid_picture.hpp>
 #include <decant/io/mesh_file.hpp>
 #include <decant/io/png.hpp>
@@ -58,7 +59,7 @@ struct RunResult {
   std::vector<decant::HtmlReport::Frame> pictures;
   std::vector<std::string> notes;     ///< about fillings, one line each
   std::vector<std::string> warnings;  ///< about meshes, one line each; also printed to stderr
-  std::string status = "ok";       ///< or why it ended early
+  std::string status = "ok";          ///< or why it ended early
   long particles = 0, lost = 0, spilled = 0;
   long sub_steps = 0, iterations = 0, unconverged_frames = 0;
   double density_error_max = 0;  ///< [-]
@@ -103,7 +104,9 @@ inline decant::BodyShape shape_of(const decant::scene::Body& body, double spacin
 /// whole number of spacings wide gets as many as fit, and its liquid sinks a little.
 inline decant::PointArray<double> lattice(const decant::scene::Box& box, double spacing) {
   const decant::Vector3<double> size = box.max - box.min;
-  Eigen::Array3d count = (size.array() / spacing + 1e-6).floor();
+  const Eigen::Array3d count = (size.array() / spacing + 1e-6).floor();
+  decant::expects(count.prod() <= decant::most_particles, "scene: number of particles in a box",
+                  "at most 1e8 at this spacing", count.prod());
   decant::PointArray<double> places(3, static_cast<decant::Index>(count.prod()));
   const Eigen::Array3d width = size.array() / count.max(1.0);
   decant::Index n = 0;

@@ -4,6 +4,7 @@
 
 #include <decant/simulation/simulator.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -24,17 +25,17 @@ using namespace decant;
 
 namespace {
 
-// A column of liquid that collapses in a rocking box beside a post, with an inlet above: 20 frames of splashing.
+// A column of liquid that collapses in a rocking box beside a post, with an inlet above.
 template <class Parts>
-Simulator<Parts> splash(int threads, int per_side = 10, int layers = 0) {
+Simulator<Parts> splash(int threads, int per_side, int rows, int layers) {
   using Scalar = typename Parts::Scalar;
   constexpr double spacing = 0.006;  // [m]
   Simulator<Parts> simulator(decant_test::with_spacing(spacing, threads));
-  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, 0.0601, 0.12}, 0.002, {}},
-                     decant_test::rocking(1, 9, 0.01, 12));
+  const double depth = std::max(10, rows) * spacing + 1e-4;
+  simulator.add_body("box", BoxInside{{0, 0, 0}, {0.12, depth, 0.12}, 0.002, {}}, decant_test::rocking(1, 9, 0.01, 12));
   simulator.add_body("post", TriangleMesh(Cylinder{0.006, 0.05}.mesh()),
                      PoseTrack(Pose{Eigen::Quaterniond::Identity(), {0.066, 0.03, 0.035}}), Slip::None);
-  const auto x = decant_test::block<Scalar>(per_side, per_side, layers > 0 ? layers : per_side, spacing);
+  const auto x = decant_test::block<Scalar>(per_side, rows, layers, spacing);
   simulator.add_particles(x, PointArray<Scalar>::Zero(3, x.cols()), 0);
   InletSettings inlet;
   inlet.position = {0.05, 0.03, 0.085};
@@ -44,11 +45,16 @@ Simulator<Parts> splash(int threads, int per_side = 10, int layers = 0) {
   return simulator;
 }
 
-// The same, but more liquid: a second thread gets no work before there is enough of it.
+template <class Parts>
+Simulator<Parts> splash(int threads, int per_side = 10) {
+  return splash<Parts>(threads, per_side, per_side, per_side);
+}
+
+// The same, but more liquid: a fourth thread gets no work before there is enough of it.
 template <class Parts>
 Simulator<Parts> shared_splash(int threads) {
-  static_assert(10 * 10 * 12 >= 2 * least_per_thread);
-  return splash<Parts>(threads, 10, 12);
+  static_assert(10 * 18 * 12 >= 4 * least_per_thread);
+  return splash<Parts>(threads, 10, 18, 12);
 }
 
 // Positions and velocities by id, and the reports: all bits that a user can see.
@@ -107,10 +113,10 @@ struct BruteParts : DefaultParts<Scalar> {
 
 TEMPLATE_TEST_CASE("determinism: the same bits with 1 and 2 and 4 threads", "", float, double) {
   auto one = shared_splash<DefaultParts<TestType>>(1);
-  const auto expected = run(one, 20);
+  const auto expected = run(one, 10);
   for (const int threads : {2, 4}) {
     auto other = shared_splash<DefaultParts<TestType>>(threads);
-    CHECK((run(other, 20) == expected));
+    CHECK((run(other, 10) == expected));
   }
 }
 

@@ -4,6 +4,9 @@
 #include <decant/simulation/fill.hpp>
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <decant/boundary/shapes.hpp>
@@ -126,4 +129,30 @@ TEST_CASE("fill: what cannot be filled is refused by name") {
   weightless.add_body("glass", CylinderInside{0.03, 0.06, 0.002, Face::PositiveZ});
   REQUIRE_THROWS_WITH(fill(weightless, 0, FillAmount::fraction(0.1)), decant_test::contains("gravity"));
   CHECK(simulator.fluid().size() == 0);
+}
+
+TEST_CASE("fill: a container far too large for the spacing is refused at once") {
+  // 100 m at 10 mm: some 1e12 particles, and as many places to look at
+  const BoxInside tank{{-100, -100, 0}, {100, 100, 100}, 0.5, Face::PositiveZ};
+  const CylinderInside silo{100, 100, 0.5, Face::PositiveZ};
+  LiquidSimulator simulator(with_spacing(0.01));
+  simulator.add_body("tank", tank);
+  simulator.add_body("silo", silo, PoseTrack(Pose{Eigen::Quaterniond::Identity(), {300, 0, 0}}));
+  for (const auto& [body, amount] : {std::pair{BodyId(0), FillAmount::fraction(0.5)},
+                                     {0, FillAmount::volume(1000)},
+                                     {0, FillAmount::level(20)},
+                                     {1, FillAmount::fraction(1)}}) {
+    std::string refusal;
+    try {
+      fill(simulator, body, amount);
+    } catch (const std::invalid_argument& error) {
+      refusal = error.what();
+    }
+    CHECK(refusal.rfind(std::string("fill: body '") + (body == 0 ? "tank" : "silo") +
+                            "': number of particles in all must be at most 1e8 at this spacing, got ",
+                        0) == 0);
+  }
+  CHECK(simulator.fluid().size() == 0);
+  // a little liquid is not looked for all over the tank
+  CHECK(fill(simulator, 0, FillAmount::volume(1e-4)).particles == 100);
 }

@@ -148,6 +148,10 @@ TEMPLATE_TEST_CASE("hostile: particles that are not finite are refused and none 
   CHECK(refusal([&] {
           simulator.add_particles(PointArray<TestType>::Zero(3, 2), PointArray<TestType>::Zero(3, 1), 0);
         }).find("number of velocities") != std::string::npos);
+  // memory that nobody touches
+  const PointArray<TestType> too_many(3, 100'000'000);
+  CHECK(refusal([&] { simulator.add_particles(too_many, too_many, 0); }) ==
+        "Simulator: number of particles must be at most 1e8, got " + std::to_string(100'000'000 + count));
   CHECK(simulator.fluid().size() == count);
 }
 

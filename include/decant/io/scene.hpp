@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include <decant/core/fluid_state.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/json.hpp>
@@ -204,7 +205,6 @@ class SceneReader {
  private:
   // Bounds that no sensible scene reaches, so that a mistyped number ends in a message and not in swapping.
   static constexpr double sample_limit = 1e7;
-  static constexpr double particle_limit = 1e8;
   static constexpr double length_limit = 1e4;  // [m]
   static constexpr std::size_t part_limit = 1000;
 
@@ -413,7 +413,7 @@ class SceneReader {
 
   void count_particles(const JsonNode& node, double volume) {
     particles_ += volume / (scene_.spacing * scene_.spacing * scene_.spacing);
-    if (!(particles_ <= particle_limit)) {
+    if (!(particles_ <= most_particles)) {
       node.refuse("liquid of at most 1e8 particles in all at this spacing_m");
     }
   }

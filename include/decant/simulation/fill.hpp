@@ -15,6 +15,7 @@
 
 #include <decant/boundary/cavity.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/fluid_state.hpp>
 #include <decant/core/types.hpp>
 #include <decant/simulation/simulator.hpp>
 
@@ -86,16 +87,20 @@ inline PointArray<double> places_in(const Cavity& cavity, const BoundingVolumeHi
   const Vector3<double> along = up.cross(across);
   const Eigen::AlignedBox3d bounds = surface.bounds();
   const Vector3<double> center = bounds.center();
-  const double radius = 0.5 * bounds.diagonal().norm();
+  const Vector3<double> half = 0.5 * bounds.sizes();
   std::vector<std::pair<double, Vector3<double>>> places;
   for (double width = spacing;; width *= 0.98) {
     places.clear();
-    const auto reach = static_cast<long>(std::ceil(radius / width));
+    const auto reach_across = static_cast<long>(std::ceil(half.dot(across.cwiseAbs()) / width));
+    const auto reach_along = static_cast<long>(std::ceil(half.dot(along.cwiseAbs()) / width));
+    const auto enough = static_cast<std::size_t>(count);
     const double bottom = cavity.bottom_height();
     const double foot = bottom - center.dot(up);
-    for (long k = 0; bottom + (static_cast<double>(k) + 0.5) * width <= cavity.rim_height(); ++k) {
-      for (long j = -reach; j <= reach; ++j) {
-        for (long i = -reach; i <= reach; ++i) {
+    // from the bottom up, and no farther than needed: a little liquid in a large tank takes little time
+    const auto wanted = [&] { return places.size() < enough; };
+    for (long k = 0; wanted() && bottom + (static_cast<double>(k) + 0.5) * width <= cavity.rim_height(); ++k) {
+      for (long j = -reach_along; wanted() && j <= reach_along; ++j) {
+        for (long i = -reach_across; wanted() && i <= reach_across; ++i) {
           const double height = (static_cast<double>(k) + 0.5) * width;
           const Vector3<double> x = center + (foot + height) * up + (static_cast<double>(i) + 0.5) * width * across +
                                     (static_cast<double>(j) + 0.5) * width * along;
@@ -105,8 +110,6 @@ inline PointArray<double> places_in(const Cavity& cavity, const BoundingVolumeHi
         }
       }
     }
-    std::stable_sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    const auto enough = static_cast<std::size_t>(count);
     if ((places.size() >= enough && (enough == 0 || places[enough - 1].first <= level + 0.5 * width)) ||
         width < 0.7 * spacing) {
       break;
@@ -126,7 +129,8 @@ inline PointArray<double> places_in(const Cavity& cavity, const BoundingVolumeHi
 
 /// Fills a body that stands still or is held at its pose of this moment; what is settled is at rest relative to it.
 /// A level is met within a quarter of a spacing where the number of particles allows it.
-/// Throws std::invalid_argument if the body holds no liquid as it stands, or not as much.
+/// Throws std::invalid_argument if the body holds no liquid as it stands, or not as much, or if that would make more
+/// than most_particles.
 template <class Parts>
 FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amount) {
   using Scalar = typename Parts::Scalar;
@@ -162,8 +166,10 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
           "between 0 and what it holds below its rim", volume);
 
   const double particle_volume = spacing * spacing * spacing;
+  const double in_all = static_cast<double>(simulator.fluid().size()) + volume / particle_volume;
+  expects(in_all <= most_particles, name + "number of particles in all", "at most 1e8 at this spacing", in_all);
   auto count = static_cast<Index>(std::llround(volume / particle_volume));
-  const auto most = static_cast<Index>(std::llround(report.capacity / particle_volume));
+  const auto most = static_cast<Index>(std::llround(std::min(report.capacity / particle_volume, most_particles)));
   const auto place = [&](Index n) {
     const double level =
         cavity.height_of(std::min(static_cast<double>(n) * particle_volume, report.capacity)) - cavity.bottom_height();

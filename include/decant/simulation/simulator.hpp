@@ -141,9 +141,12 @@ class Simulator {
   }
 
   /// Adds particles of one spacing's volume each. @param position, velocity 3xN, [m] and [m/s], world frame, finite.
+  /// Throws std::invalid_argument if they are not, or if there would be more than most_particles.
   void add_particles(const ConstPointsView<Scalar>& position, const ConstPointsView<Scalar>& velocity, Origin origin) {
     expects(position.cols() == velocity.cols(), "Simulator: number of velocities", "that of positions",
             velocity.cols());
+    expects(static_cast<double>(fluid_.size() + position.cols()) <= most_particles, "Simulator: number of particles",
+            "at most 1e8", fluid_.size() + position.cols());
     expects(position.allFinite(), "Simulator: positions of new particles", "finite", "NaN or infinity");
     expects(velocity.allFinite(), "Simulator: velocities of new particles", "finite", "NaN or infinity");
     for (Index k = 0; k < position.cols(); ++k) {
