@@ -26,7 +26,8 @@ namespace decant {
 /// One layer stands for the wall whatever its thickness. What differs from MeshWall: the fraction is that of a layer,
 /// not of the space behind it, so it falls off again behind the surface, a thin wall is felt from both sides (with the
 /// gradient towards the surface on either), and corners and flat parts differ by the unevenness of the cover, some 6
-/// per cent. Memory grows with the area only. Kept for comparison with other codes; MeshWall is more accurate.
+/// per cent; and liquid begins half a spacing off the surface, so that a vessel is narrower by as much. Memory grows
+/// with the area only. Kept for comparison with other codes; MeshWall is more accurate.
 /// Immutable after construction; refers to the hierarchy, which it does not own.
 class SampledWall {
  public:
