@@ -151,7 +151,7 @@ class Dfsph {
   enum class Flag : std::uint8_t { No, Yes };  // vector<bool> shares bytes between threads
 
   static constexpr Scalar contact_room = Scalar(0.1), loose_room = Scalar(0.2);  ///< of rest density
-  static constexpr Scalar largest_correction = Scalar(0.05);                     ///< of rest density, per sub-step
+  static constexpr Scalar largest_correction = Scalar(0.2);                      ///< of rest density, per sub-step
   static constexpr Scalar largest_shift = Scalar(0.2);                           ///< spacings, per sub-step
   /// Where particles meet in disorder at high speed, D sees little of it, and places alone would have to be moved so
   /// far that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
