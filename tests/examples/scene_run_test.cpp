@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <numeric>
 #include <string>
 #include <vector>
 
@@ -156,7 +157,9 @@ TEST_CASE("scene runs: every scene that comes with the library starts as its fil
         CHECK(std::isnan(values.front()));  // none is known before the first step
         CHECK(std::all_of(values.begin() + 1, values.end(), [](double value) { return std::isfinite(value); }));
         if (kind == "force_n_z") {
-          CHECK(values.back() == Approx(-expected.weight).epsilon(0.05));
+          // one sub-step's force is some 5 % of the weight off, now more and now less
+          const double mean = std::accumulate(values.begin() + 1, values.end(), 0.0) / static_cast<double>(frames);
+          CHECK(mean == Approx(-expected.weight).epsilon(0.03));
         }
       }
     }

@@ -78,8 +78,8 @@ struct StepReport {
   int sub_steps = 0;
   int density_iterations = 0;
   int divergence_iterations = 0;
-  double density_error = 0;        ///< largest of the sub-steps: mean compression over rest density, as predicted to first
-                                   ///< order [-]; where particles collide more can remain
+  double density_error = 0;        ///< largest of the sub-steps: mean compression over rest density [-], as predicted to
+                                   ///< first order: where particles collide, more remains
   double divergence_error = 0;     ///< likewise, compression per sub-step that velocities still carry [-]
   double kinetic_energy = 0;       ///< at the end of the frame [J]
   double volume = 0;               ///< mass over rest density [m^3]
