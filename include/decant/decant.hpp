@@ -47,6 +47,7 @@
 #include <decant/core/pose.hpp>
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
+#include <decant/correction/edge_fit.hpp>
 #include <decant/correction/map_filter.hpp>
 #include <decant/correction/map_filter_schenck2017.hpp>
 #include <decant/correction/mass_relocation.hpp>
