@@ -267,12 +267,12 @@ void add_forecasts(const decant::Recording& recording, std::size_t frame, double
     }
     const TrackerSettings& settings = tracker.settings();
     MaskCleaning(settings.cleaning_window_px, settings.smallest_region_px).apply(*mask, seen);
-    tracker.predict(future, 0, forecast);
+    tracker.predict(future, 0, recording.cameras.front().view(target).camera_from_world, forecast);
     result.forecasts[k].add(overlap(forecast, seen));
   }
 }
 
-/// A tracker with the recording's cameras.
+/// A tracker with the recording's cameras. Throws std::invalid_argument if one of them zooms or is cropped on the way.
 template <class CorrectorType, class Model>
 decant::Tracker<Model, CorrectorType> tracker_for(const decant::Recording& recording, const Model& model,
                                                   CorrectorType corrector, const TrackingOptions& options) {
@@ -282,6 +282,10 @@ decant::Tracker<Model, CorrectorType> tracker_for(const decant::Recording& recor
   decant::Tracker<Model, CorrectorType> tracker(model, std::move(corrector), settings);
   for (const decant::recording::Camera& camera : recording.cameras) {
     const decant::recording::View& view = camera.view(0);
+    for (const decant::recording::View& other : camera.views) {
+      decant::expects(other.same_lens(view), "track: focal lengths, centre and distortion of a camera",
+                      "the same in every frame", "others in some");
+    }
     tracker.add_camera(camera_of(view, recording.width, recording.height), view.camera_from_world);
   }
   return tracker;

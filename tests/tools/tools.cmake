@@ -204,6 +204,16 @@ elseif(CASE STREQUAL "track_refuses_a_bad_recording")
   file(WRITE "${SCRATCH}/bad/recording.json" "{\"format\": \"decant-recording\", \"version\": 7}")
   run(2 bad --json out.json)
   expect_one_line("${errors}" "version")
+  # a lens that zooms
+  file(COPY "${SOURCE}/examples/data/pour_cup" DESTINATION "${SCRATCH}")
+  set(at "\"cam_R_w2c\": [1, 0, 0, 0, 1, 0, 0, 0, 1], \"cam_t_w2c\": [0, 0, 600], \"depth_scale\": 1.0")
+  set(views "\"0\": {\"cam_K\": [600, 0, 319.5, 0, 600, 239.5, 0, 0, 1], ${at}}")
+  foreach(frame RANGE 1 83)
+    string(APPEND views ", \"${frame}\": {\"cam_K\": [61${frame}, 0, 319.5, 0, 600, 239.5, 0, 0, 1], ${at}}")
+  endforeach()
+  file(WRITE "${SCRATCH}/pour_cup/scene_camera.json" "{${views}}")
+  run(2 pour_cup --json out.json)
+  expect_one_line("${errors}" "the same in every frame")
 
 elseif(CASE STREQUAL "tracking_experiment_scores_and_resumes")
   # as small as it goes: that figures arrive where they should; what they are is for the experiment itself

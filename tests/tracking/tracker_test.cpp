@@ -106,6 +106,25 @@ TEST_CASE("tracker: a camera that moves sees from where it is") {
   CHECK(tracker.track({0.3, {}, masks}).status == FrameStatus::Ok);
 }
 
+TEST_CASE("tracker: a forecast is seen from where the camera will be") {
+  Tracker<FallingDust, OpenLoop<double>> moving(FallingDust{}), beside(FallingDust{});
+  moving.add_camera(decant_test::seeing_camera(), decant_test::before_the_block());
+  beside.add_camera(decant_test::seeing_camera(), decant_test::beside_the_block());
+  FallingDust future = moving.model();
+  future.dust.position.row(0).array() += 0.02;  // seen by the one camera, but hardly by the other
+  Mask now, then, after, wanted;
+  moving.predict(future, 0, now);
+  moving.predict(future, 0, decant_test::beside_the_block(), then);
+  moving.predict(future, 0, after);
+  beside.predict(future, 0, wanted);
+  REQUIRE((wanted == mask_liquid).any());
+  CHECK((then == wanted).all());
+  CHECK_FALSE((now == wanted).all());
+  CHECK((after == now).all());
+  CHECK_THROWS_WITH(moving.predict(future, 1, Pose{}, then),
+                    decant_test::contains("camera must be one that was added"));
+}
+
 TEST_CASE("tracker: gaps between particles are closed from near and far, those between films are not") {
   // two films, three spacings apart
   FallingDust film;

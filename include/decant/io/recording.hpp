@@ -84,6 +84,10 @@ struct View {
   std::array<double, 5> distortion{};     ///< k1, k2, p1, p2, k3 (plumb bob); zeros for a pinhole
   Pose camera_from_world{};
 
+  /// Whether another view differs by its pose at most.
+  bool same_lens(const View& other) const {
+    return fx == other.fx && fy == other.fy && cx == other.cx && cy == other.cy && distortion == other.distortion;
+  }
   bool distorted() const {
     for (const double coefficient : distortion) {
       if (coefficient != 0) {
@@ -167,8 +171,8 @@ struct Recording {
   }
 
   /// Where liquid was seen: the mask or, where a frame has none but a thermal image, the label of that
-  /// (ThermalLabel); nothing for a frame with neither. What the thermal imager does not see counts as no liquid. Else as
-  /// mask().
+  /// (ThermalLabel); nothing for a frame with neither. What the thermal imager does not see counts as no liquid. Else
+  /// as mask().
   std::optional<Mask> liquid_mask(std::size_t frame, std::size_t camera = 0) const {
     std::optional<Mask> label = mask(frame, camera);
     if (!label && thermal_imager) {

@@ -249,6 +249,15 @@ class Tracker {
     mask.resize(eye.predicted.rows(), eye.predicted.cols());
     draw(model, eye, mask);
   }
+  /// The same for a camera that will be elsewhere by then.
+  void predict(const Model& model, std::size_t camera, const Pose& camera_from_world, Mask& mask) {
+    expects(camera < eyes_.size(), "Tracker: camera", "one that was added", camera);
+    Eye& eye = eyes_[camera];
+    const Pose now = eye.occlusion.camera().camera_from_world();
+    eye.occlusion.set_camera_pose(camera_from_world);
+    predict(model, camera, mask);
+    eye.occlusion.set_camera_pose(now);
+  }
 
  private:
   using Clock = std::chrono::steady_clock;
