@@ -24,6 +24,7 @@ using decant::Index;
 using decant::Vector3;
 using decant_test::Eye;
 using decant_test::liquid_block;
+using decant_test::observation;
 
 namespace {
 
@@ -46,10 +47,7 @@ decant::CorrectionReport correct(CorrectorType& corrector, decant::FluidState<Sc
     for (Eye<Scalar>* eye : eyes) {
       views.push_back(eye->predict(fluid));
     }
-    const auto report = corrector.correct(
-        fluid,
-        {views, pass, decant_test::block_spacing, decant_test::block_radius, Vector3<double>(0, 0, -9.81), threads},
-        Scalar(1.0 / 30));
+    const auto report = corrector.correct(fluid, observation(views, pass, threads), Scalar(1.0 / 30));
     all.moved += report.moved;
     all.mean_shift += report.mean_shift;
   }
@@ -204,8 +202,7 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   eye.observed.block(70, 130, 10, 10).setConstant(decant::mask_liquid);  // right of the particle, a little above it
   decant::MapFilterSchenck2017<double> filter;
   const auto views = std::array{eye.predict(fluid)};
-  const auto report =
-      filter.correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  const auto report = filter.correct(fluid, observation(views), 1.0 / 30);
   CHECK(report.moved == 1);
   // by hand: of all places the one whose pixel is nearest to the patch, so right, up, and nearer to the camera, where a
   // step of 5 mm takes more pixels
@@ -218,7 +215,7 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   eye.sight.add(std::make_shared<const decant::BoundingVolumeHierarchy>(
       decant::Box{{0.002, -0.02, -0.1}, {0.003, 0.1, 0.1}}.mesh()));
   const auto walled = std::array{eye.predict(fluid)};
-  filter.correct(fluid, {walled, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30);
+  filter.correct(fluid, observation(walled), 1.0 / 30);
   CHECK(fluid.position(0, 0) <= 0);
   CHECK(fluid.position(2, 0) == Approx(0.005));
 
@@ -226,8 +223,7 @@ TEST_CASE("printed MAP filter: the best of 27 places by the activation, and a ve
   fluid.position.col(0) << 0, 0, 0;
   eye.observed.setZero();
   const auto blind = std::array{eye.predict(fluid)};
-  CHECK(filter.correct(fluid, {blind, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30)
-            .moved == 0);
+  CHECK(filter.correct(fluid, observation(blind), 1.0 / 30).moved == 0);
 }
 
 TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is felt by hidden neighbours") {
@@ -246,7 +242,7 @@ TEST_CASE("warp field: pulls toward what was seen, parallel to the image, and is
   eye.drawing.render(fluid.position, eye.hidden, eye.sight.camera().camera(), eye.sight.camera().camera_from_world(),
                      eye.predicted);
   const auto views = std::array{view};
-  field.correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 0.5);
+  field.correct(fluid, observation(views), 0.5);
   // the sum by hand: one pixel, u = (30.5, -0.5) px, not covered; a pixel is a millimetre
   const double u = 30.5, v = -0.5, weight = std::exp(-(u * u + v * v) / (33 * 33));
   const double h = 2 * 0.005 / decant::CubicSpline<double>::support_factor, volume = std::pow(0.005, 3);
@@ -272,8 +268,7 @@ TEST_CASE("mass relocation: fills what is seen two frames running from what is n
   CHECK(correct(relocation, fluid, std::array{&eye}).moved == 0);  // seen once: may be noise
   CHECK(fluid.position == start.position);
   auto views = std::array{eye.predict(fluid)};
-  const auto report = relocation.correct(
-      fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0f / 30);
+  const auto report = relocation.correct(fluid, observation(views), 1.0f / 30);
   CHECK(report.relocated > 5);
   CHECK(report.relocated <= 20);  // 4 % of 512
   Index changed = 0;
@@ -348,9 +343,7 @@ TEST_CASE("mass relocation: liquid that comes into sight where none is simulated
   decant::MassRelocation<double> relocation;
   correct(relocation, fluid, std::array{&eye});
   const auto views = std::array{eye.predict(fluid)};
-  REQUIRE(relocation
-              .correct(fluid, {views, 0, 0.005, decant_test::block_radius, Vector3<double>(0, 0, -9.81), {1}}, 1.0 / 30)
-              .relocated >= 1);
+  REQUIRE(relocation.correct(fluid, observation(views), 1.0 / 30).relocated >= 1);
   const double bottom = start.position.row(2).minCoeff();
   for (Index i = 0; i < fluid.size(); ++i) {
     if (fluid.position.col(i) != start.position.col(i)) {
@@ -368,11 +361,7 @@ TEST_CASE("correctors: their laws") {
   right.observe(fluid);
   wrong.observe(liquid_block<float>({0.01, 0, 0.004}));
   const auto seen_right = std::array{right.predict(fluid)}, seen_wrong = std::array{wrong.predict(fluid)};
-  const Vector3<double> gravity(0, 0, -9.81);
-  const decant::Silhouettes<decant::DistortedPinholeCamera> nothing{{},      0,  0.005, decant_test::block_radius,
-                                                                    gravity, {1}},
-      perfect{seen_right, 0, 0.005, decant_test::block_radius, gravity, {1}},
-      other{seen_wrong, 0, 0.005, decant_test::block_radius, gravity, {1}};
+  const auto nothing = observation({}), perfect = observation(seen_right), other = observation(seen_wrong);
   const double anywhere = std::numeric_limits<double>::infinity();
   const auto require_laws = [&](const auto& corrector, double still) {
     for (const auto& law :

@@ -121,8 +121,7 @@ TEMPLATE_TEST_CASE("edge fit: takes away most of what a block's silhouette is of
   const auto before = wrong();
   for (int pass = 0; pass < 4; ++pass) {
     const auto views = std::array{eye.predict(fluid)};
-    fit.correct(fluid, {views, pass, decant_test::block_spacing, decant_test::block_radius, {0, 0, -9.81}, {1}},
-                TestType(1.0 / 30));
+    fit.correct(fluid, decant_test::observation(views, pass), TestType(1.0 / 30));
   }
   eye.predict(fluid);
   INFO(before << " px before, " << wrong() << " px after");

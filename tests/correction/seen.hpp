@@ -4,6 +4,7 @@
 /// A block of liquid before one or two cameras, and silhouettes of it from other places: what correctors are tried on.
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
@@ -15,6 +16,13 @@
 namespace decant_test {
 
 inline constexpr double block_spacing = 0.005, block_radius = 0.66 * block_spacing;
+
+/// What a corrector is told of the views, for particles of these tests.
+inline decant::Silhouettes<decant::DistortedPinholeCamera> observation(
+    std::span<const decant::SilhouetteView<decant::DistortedPinholeCamera>> views, int pass = 0,
+    decant::Threads threads = {1}) {
+  return {views, pass, block_spacing, block_radius, {0, 0, -9.81}, threads};
+}
 
 /// 8 x `deep` x 8 particles around `center` [m], at rest.
 template <class Scalar>

@@ -21,8 +21,8 @@ namespace decant {
 class GapClosing {
  public:
   /// @param gap_px closes gaps up to this width [px], 0 (does nothing) to 64; an odd number acts as the even one above
-  /// it, since the disc, of radius gap_px / 2, reaches as far to either side. Tracker
-  /// chooses it by how large particles look. Throws std::invalid_argument.
+  /// it, since the disc, of radius gap_px / 2, reaches as far to either side. Tracker chooses
+  /// it by how large particles look. Throws std::invalid_argument.
   explicit GapClosing(int gap_px = 4) {
     half_width_.reserve(widest_px / 2 + 1);
     set_gap_px(gap_px);
