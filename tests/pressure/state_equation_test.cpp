@@ -45,6 +45,12 @@ auto accelerations(Solver& solver, Liquid& liquid, int threads = 1) {
   return result;
 }
 
+/// Tait's equation in double precision.
+template <class Solver>
+double tait(const Solver& solver, double density) {
+  return static_cast<double>(solver.stiffness) * (std::pow(density / 1000, static_cast<double>(solver.exponent)) - 1);
+}
+
 template <class Liquid, class Accelerations>
 void check_momentum(const Liquid& liquid, const Accelerations& acceleration) {
   Vector3<double> linear = Vector3<double>::Zero(), angular = Vector3<double>::Zero();
@@ -155,6 +161,21 @@ TEMPLATE_TEST_CASE("StateEquation: the longest step is that of sound", "", float
   CHECK(static_cast<double>(solver.largest_step(liquid.view())) == Approx(0.4 * 0.005 / 18.708).epsilon(1e-3));
   solver.artificial_viscosity = 20;
   CHECK(solver.largest_step(liquid.view()) < TestType(0.5 * 0.4 * 0.005 / 18.708));
+}
+
+TEMPLATE_TEST_CASE("StateEquation: compressed liquid is stiffer and asks for shorter steps", "", float, double) {
+  auto liquid = squeezed_ball<TestType>(0.0);
+  const double ratio = static_cast<double>(liquid.fluid.density.maxCoeff()) / 1000;
+  REQUIRE(ratio > 1.1);
+  for (const double exponent : {1.0, 2.5, 7.0}) {
+    StateEquation<TestType> solver;
+    solver.exponent = static_cast<TestType>(exponent);
+    accelerations(solver, liquid);
+    // the slope of the pressure at that density, by differences
+    const double slope = (tait(solver, 1000 * (ratio + 1e-4)) - tait(solver, 1000 * (ratio - 1e-4))) / (2e-4 * 1000);
+    CHECK(static_cast<double>(solver.largest_step(liquid.view())) ==
+          Approx(0.4 * 0.005 / std::sqrt(slope)).epsilon(1e-3));
+  }
 }
 
 TEMPLATE_TEST_CASE("StateEquation survives few particles and two at one place", "", float, double) {
