@@ -295,7 +295,6 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::f
   if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
     StateEquation<float>& solver = reality.pressure_solver();
     solver.set_sound_speed(14, static_cast<float>(settings.liquid.density));  // six times as fast as the jet
-    solver.courant_number = 0.6F;
     solver.artificial_viscosity = 1;  // until it has calmed down
   }
   using Filling = std::conditional_t<foreign, SettledParts, Parts>;

@@ -24,8 +24,9 @@ namespace decant {
 ///   a_i = -sum_j m_j (P_i + P_j) grad W_ij - 2 rho_0 P_i grad phi_i,    P = p / rho^2,
 /// where walls mirror the particle's pressure (see PressureSystem). Densities are the summed ones of the sub-step, so
 /// they do not drift. One sweep over the pairs and nothing stored per pair; steps are as short as sound demands, about
-/// 0.4 d/c, where c is that of the most compressed particle: an impact stiffens the liquid. With gamma = 1 it is the
-/// linear p = c^2 (rho - rho_0): see set_sound_speed.
+/// 0.3 d/c, where c is that of the most compressed particle: an impact stiffens the liquid. With longer ones, drops
+/// that meet at a wall are thrown away at many times their speed. With gamma = 1 it is the linear p = c^2 (rho -
+/// rho_0): see set_sound_speed.
 template <class ScalarType>
 class StateEquation {
  public:
@@ -34,7 +35,7 @@ class StateEquation {
 
   Scalar stiffness = Scalar(50000);     ///< B [Pa], > 0
   Scalar exponent = Scalar(7);          ///< gamma [-], >= 1
-  Scalar courant_number = Scalar(0.4);  ///< how many spacings the fastest sound may travel per sub-step, > 0
+  Scalar courant_number = Scalar(0.3);  ///< how many spacings the fastest sound may travel per sub-step, > 0
   /// Lets pressures be negative where the liquid is thinner than at rest. Off by default: a summed density is low at
   /// every free surface, and particles that attract each other clump (the tensile instability, Monaghan 2000).
   bool negative_pressure = false;
