@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 
 #include <decant/boundary/mesh_repair.hpp>
 #include <decant/boundary/shapes.hpp>
@@ -20,7 +21,7 @@ using decant::Face;
 using decant::TriangleMesh;
 using Point = decant::Vector3<double>;
 
-const double pi = std::acos(-1.0);
+using std::numbers::pi;
 
 }  // namespace
 

@@ -13,6 +13,8 @@
 
 namespace decant_test {
 
+inline constexpr double spacing = 0.005;  ///< of the particles at walls [m]
+
 /// Uniform in a cube of half size `reach` about a center.
 inline decant::Vector3<double> random_point(std::mt19937& random, const decant::Vector3<double>& center, double reach) {
   std::uniform_real_distribution<double> place(-reach, reach);

@@ -19,7 +19,7 @@ using decant::Vector3;
 namespace {
 
 using Kernel = decant::CubicSpline<double>;
-constexpr double spacing = 0.005;
+using decant_test::spacing;
 
 // Box from min to max as 12 triangles.
 decant::TriangleMesh box_mesh(const Vector3<double>& min, const Vector3<double>& max) {

@@ -13,13 +13,14 @@
 #include <decant/boundary/shapes.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 
+#include "boundary/mesh_samples.hpp"
 #include "catch.hpp"
 
 using namespace decant;
 
 namespace {
 
-constexpr double spacing = 0.005;
+using decant_test::spacing;
 
 Pose at(const Vector3<double>& x, double angle = 0, const Vector3<double>& axis = Vector3<double>::UnitZ()) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis.normalized())), x};

@@ -8,6 +8,7 @@
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 
+#include "boundary/mesh_samples.hpp"
 #include "catch.hpp"
 
 using decant::BoundingVolumeHierarchy;
@@ -19,7 +20,7 @@ using decant::WallSample;
 
 namespace {
 
-constexpr double spacing = 0.005;
+using decant_test::spacing;
 
 /// A square plate in the plane z = 0, cut into cells x cells squares.
 TriangleMesh plate(double half, int cells) {

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <string>
 
@@ -18,7 +19,7 @@ using decant::Face;
 using decant::TriangleMesh;
 using Point = decant::Vector3<double>;
 
-const double pi = std::acos(-1.0);
+using std::numbers::pi;
 
 // Closed, looking outward, of the given volume; distances and insides by formula and by mesh agree to `deviation`.
 template <class Shape>

@@ -5,17 +5,14 @@
 #include <random>
 #include <string>
 
+#include "camera/affine_coefficients.hpp"
 #include "catch.hpp"
 
 namespace {
 
 using decant::AffineMap;
 
-AffineMap::Matrix coefficients(double a, double b, double c, double d, double e, double f) {
-  AffineMap::Matrix matrix;
-  matrix << a, b, c, d, e, f;
-  return matrix;
-}
+using decant_test::coefficients;
 
 }  // namespace
 

@@ -13,6 +13,7 @@
 
 #include <Eigen/SVD>
 
+#include "camera/affine_coefficients.hpp"
 #include "catch.hpp"
 #include "data.hpp"
 
@@ -25,11 +26,7 @@ using decant::AffineMap;
 using decant::fit_affine;
 using Points = Eigen::Matrix2Xd;
 
-AffineMap::Matrix coefficients(double a, double b, double c, double d, double e, double f) {
-  AffineMap::Matrix matrix;
-  matrix << a, b, c, d, e, f;
-  return matrix;
-}
+using decant_test::coefficients;
 
 // A board's corners as a thermal camera sees them: 6 x 5, 36 px apart, tilted by perspective.
 Points board() {
@@ -311,7 +308,8 @@ TEST_CASE("Affine fit: says when a map cannot be trusted") {
 
   CHECK(std::string(to_string(AffineFitStatus::Good)) == "good");
   CHECK(std::string(to_string(AffineFitStatus::Unverified)) == "too few pairs to tell a wrong one");
-  CHECK(std::string(to_string(AffineFitStatus::Scattered)) == "more than half of the pairs follow no common affine map");
+  CHECK(std::string(to_string(AffineFitStatus::Scattered)) ==
+        "more than half of the pairs follow no common affine map");
 }
 
 TEST_CASE("Affine fit: refuses what fixes no map") {

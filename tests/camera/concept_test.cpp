@@ -21,7 +21,7 @@ using decant::Projection;
 using Point = decant::Vector3<double>;
 using Affine = Eigen::Matrix<double, 2, 3>;
 
-const PinholeCamera pinhole(606, 611, 317.3, 243.9, 640, 480);
+const PinholeCamera off_center(606, 611, 317.3, 243.9, 640, 480);
 
 // The thermal imager of the recording format's example.
 Affine thermal() {
@@ -41,7 +41,7 @@ void check_laws(const char* name, const Camera& camera) {
 // What the laws have to notice.
 template <int Fault>
 struct Faulty {
-  PinholeCamera base = pinhole;
+  PinholeCamera base = off_center;
 
   Projection project(const Point& x) const noexcept {
     Projection seen = base.project(x);
@@ -96,22 +96,22 @@ int broken_laws() {
 }  // namespace
 
 TEST_CASE("Every camera keeps the laws of its concept") {
-  check_laws("pinhole", pinhole);
+  check_laws("pinhole", off_center);
   check_laws("pinhole of one pixel", PinholeCamera(3, 4, 0, 0, 1, 1));
   check_laws("wide pinhole", PinholeCamera(300, 250, 950, 500, 1920, 1080));
   check_laws("pinhole whose axis is outside of the image", PinholeCamera(900, 900, -200, 1300, 640, 480));
-  const DistortedPinholeCamera barrel(pinhole, {-0.28, 0.09, 4e-4, -7e-4, -0.012});
+  const DistortedPinholeCamera barrel(off_center, {-0.28, 0.09, 4e-4, -7e-4, -0.012});
   check_laws("barrel", barrel);
-  check_laws("pincushion", DistortedPinholeCamera(pinhole, {0.12, 0.03, -2e-3, 1e-3, 0.01}));
-  check_laws("without distortion", DistortedPinholeCamera(pinhole, {}));
+  check_laws("pincushion", DistortedPinholeCamera(off_center, {0.12, 0.03, -2e-3, 1e-3, 0.01}));
+  check_laws("without distortion", DistortedPinholeCamera(off_center, {}));
   check_laws("lens that folds inside the image",
              DistortedPinholeCamera(PinholeCamera(400, 400, 320, 240, 640, 480), {-0.4, 0.0, 1e-3, 0.0, 0.0}));
   check_laws("orthographic", OrthographicCamera(900, 310.5, 244.25, 640, 480));
-  check_laws("thermal beside pinhole", AffineRegisteredCamera<PinholeCamera>(pinhole, thermal(), 640, 512));
+  check_laws("thermal beside pinhole", AffineRegisteredCamera<PinholeCamera>(off_center, thermal(), 640, 512));
   check_laws("thermal beside lens", AffineRegisteredCamera<DistortedPinholeCamera>(barrel, thermal(), 640, 512));
   Affine mirrored;
   mirrored << -2.1, 0.3, 640, 0.2, 1.9, -7;
-  check_laws("mirrored, half as large", AffineRegisteredCamera<PinholeCamera>(pinhole, mirrored, 320, 240));
+  check_laws("mirrored, half as large", AffineRegisteredCamera<PinholeCamera>(off_center, mirrored, 320, 240));
   check_laws("beside orthographic",
              AffineRegisteredCamera<OrthographicCamera>(OrthographicCamera(800, 0, 0, 10, 10), thermal(), 320, 240));
 }

@@ -16,7 +16,7 @@ using decant::LensDistortion;
 using decant::PinholeCamera;
 using Place = Eigen::Vector2d;
 
-const PinholeCamera pinhole(600, 610, 320, 240, 640, 480);
+const PinholeCamera ideal(600, 610, 320, 240, 640, 480);
 
 // The lens in complex numbers: with w = a + i b and t = p2 + i p1 its tangential part is 2 w Re(conj(t) w) + t |w|^2.
 Place complex_distortion(const LensDistortion& lens, const Place& place) {
@@ -52,7 +52,7 @@ Place random_place(std::mt19937& random, double radius) {
 // By hand at (0.3, -0.2): r^2 = 0.13, c = 1 - 0.0325 + 0.001352 - 0.00002197 = 0.96883003;
 // a' = 0.290649009 - 0.00012 - 0.00062, b' = -0.193766006 + 0.00021 + 0.00024.
 TEST_CASE("The lens bends as plumb_bob does, in OpenCV's order of coefficients") {
-  const DistortedPinholeCamera camera(pinhole, {-0.25, 0.08, 0.001, -0.002, -0.01});
+  const DistortedPinholeCamera camera(ideal, {-0.25, 0.08, 0.001, -0.002, -0.01});
   const decant::Projection seen = camera.project({0.6, -0.4, 2});
   CHECK(seen.pixel.x() == Approx(600 * 0.289909009 + 320).epsilon(1e-12));
   CHECK(seen.pixel.y() == Approx(610 * -0.193316006 + 240).epsilon(1e-12));
@@ -61,7 +61,7 @@ TEST_CASE("The lens bends as plumb_bob does, in OpenCV's order of coefficients")
 
   std::mt19937 random(1);
   for (const LensDistortion& lens : lenses()) {
-    const DistortedPinholeCamera other(pinhole, lens);
+    const DistortedPinholeCamera other(ideal, lens);
     for (int n = 0; n < 50; ++n) {
       const Place place = random_place(random, 0.8);
       CHECK((other.distorted(place) - complex_distortion(lens, place)).norm() < 1e-14);
@@ -70,22 +70,22 @@ TEST_CASE("The lens bends as plumb_bob does, in OpenCV's order of coefficients")
 }
 
 TEST_CASE("Without coefficients the lens camera is the pinhole") {
-  const DistortedPinholeCamera camera(pinhole, {});
+  const DistortedPinholeCamera camera(ideal, {});
   CHECK(std::isinf(camera.largest_radius()));
   std::mt19937 random(2);
   for (int n = 0; n < 200; ++n) {
     const Place place = random_place(random, 3);
     const decant::Vector3<double> x(1.7 * place.x(), 1.7 * place.y(), 1.7);
-    CHECK((camera.project(x).pixel - pinhole.project(x).pixel).norm() < 1e-9);
-    CHECK(camera.project(x).visible == pinhole.project(x).visible);
-    CHECK((camera.jacobian(x) - pinhole.jacobian(x)).norm() < 1e-9);
+    CHECK((camera.project(x).pixel - ideal.project(x).pixel).norm() < 1e-9);
+    CHECK(camera.project(x).visible == ideal.project(x).visible);
+    CHECK((camera.jacobian(x) - ideal.jacobian(x)).norm() < 1e-9);
   }
 }
 
 TEST_CASE("Newton finds back to every point that the lens takes in") {
   std::mt19937 random(4);
   for (const LensDistortion& lens : lenses()) {
-    const DistortedPinholeCamera camera(pinhole, lens);
+    const DistortedPinholeCamera camera(ideal, lens);
     const double radius = std::min(camera.largest_radius(), 3.0);
     for (int n = 0; n < 300; ++n) {
       const Place place = random_place(random, 0.98 * radius);
@@ -98,15 +98,14 @@ TEST_CASE("Newton finds back to every point that the lens takes in") {
 
 TEST_CASE("The lens is one to one up to its largest radius, and that is where it folds") {
   // radial only: d(rc)/dr = 1 - 0.9 r^2
-  CHECK(DistortedPinholeCamera(pinhole, {-0.3, 0, 0, 0, 0}).largest_radius() ==
-        Approx(std::sqrt(1 / 0.9)).epsilon(1e-5));
-  CHECK(std::isinf(DistortedPinholeCamera(pinhole, {0.1, 0, 0, 0, 0}).largest_radius()));
+  CHECK(DistortedPinholeCamera(ideal, {-0.3, 0, 0, 0, 0}).largest_radius() == Approx(std::sqrt(1 / 0.9)).epsilon(1e-5));
+  CHECK(std::isinf(DistortedPinholeCamera(ideal, {0.1, 0, 0, 0, 0}).largest_radius()));
   // tangential only: along the worst direction the place goes to r - 3 p r^2
-  CHECK(DistortedPinholeCamera(pinhole, {0, 0, 0.003, 0.004, 0}).largest_radius() == Approx(1 / 0.03).epsilon(1e-5));
+  CHECK(DistortedPinholeCamera(ideal, {0, 0, 0.003, 0.004, 0}).largest_radius() == Approx(1 / 0.03).epsilon(1e-5));
 
   // against a scan of the derivative's determinant, from differences of the complex form
   for (const LensDistortion& lens : lenses()) {
-    const double radius = DistortedPinholeCamera(pinhole, lens).largest_radius();
+    const double radius = DistortedPinholeCamera(ideal, lens).largest_radius();
     double first_fold = std::numeric_limits<double>::infinity();
     for (int step = 1; step <= 1500 && std::isinf(first_fold); ++step) {
       const double r = 0.002 * step;
@@ -134,7 +133,7 @@ TEST_CASE("The lens is one to one up to its largest radius, and that is where it
 }
 
 TEST_CASE("What lies beyond the fold does not come back into the image") {
-  const DistortedPinholeCamera camera(pinhole, {-0.3, 0, 0, 0, 0});
+  const DistortedPinholeCamera camera(ideal, {-0.3, 0, 0, 0, 0});
   const decant::Vector3<double> beside(1.5, 0, 1);  // the polynomial alone would put it at 1.5 (1 - 0.675) = 0.4875
   CHECK(decant::inside_image({600 * camera.distorted({1.5, 0}).x() + 320, 240}, 640, 480) == true);
   CHECK_FALSE(camera.project(beside).visible);
@@ -157,8 +156,8 @@ TEST_CASE("What lies beyond the fold does not come back into the image") {
 }
 
 TEST_CASE("What is not a lens is refused in one line") {
-  CHECK_THROWS_WITH(DistortedPinholeCamera(pinhole, {0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}),
+  CHECK_THROWS_WITH(DistortedPinholeCamera(ideal, {0, 0, std::numeric_limits<double>::quiet_NaN(), 0, 0}),
                     "DistortedPinholeCamera: coefficient of the lens [-] must be finite and within 1e6, got nan");
-  CHECK_THROWS_WITH(DistortedPinholeCamera(pinhole, {0, -2e6, 0, 0, 0}),
+  CHECK_THROWS_WITH(DistortedPinholeCamera(ideal, {0, -2e6, 0, 0, 0}),
                     "DistortedPinholeCamera: coefficient of the lens [-] must be finite and within 1e6, got 2000000");
 }

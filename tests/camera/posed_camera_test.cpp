@@ -15,7 +15,7 @@ using decant::Pose;
 using decant::PosedCamera;
 using Point = decant::Vector3<double>;
 
-const PinholeCamera pinhole(600, 500, 320, 240, 640, 480);
+const PinholeCamera unposed(600, 500, 320, 240, 640, 480);
 
 // Stands at (0, -2, 1) and looks along +y, its image upright: right is +x, down is -z.
 Pose looking_along_y() {
@@ -32,7 +32,7 @@ template class decant::PosedCamera<PinholeCamera>;
 template class decant::PosedCamera<decant::OrthographicCamera>;
 
 TEST_CASE("A posed camera sees the world from where it stands") {
-  const PosedCamera<PinholeCamera> camera(pinhole, looking_along_y());
+  const PosedCamera<PinholeCamera> camera(unposed, looking_along_y());
   CHECK((camera.position() - Point(0, -2, 1)).norm() < 1e-15);
   CHECK((camera.viewing_direction() - Point::UnitY()).norm() < 1e-15);
   const Point x(0.5, 0, 1.2);  // 2 m before the camera, 0.5 m to its right, 0.2 m above
@@ -53,7 +53,7 @@ TEST_CASE("A posed camera sees the world from where it stands") {
 }
 
 TEST_CASE("A posed camera may be moved") {
-  PosedCamera<PinholeCamera> camera(pinhole);
+  PosedCamera<PinholeCamera> camera(unposed);
   CHECK(camera.position().norm() == 0);
   Pose longer = looking_along_y();
   longer.rotation.coeffs() *= 1.5;  // is normalised
@@ -69,10 +69,10 @@ TEST_CASE("A posed camera may be moved") {
 TEST_CASE("A pose that is none is refused in one line") {
   Pose pose;
   pose.translation.y() = std::numeric_limits<double>::infinity();
-  CHECK_THROWS_WITH(PosedCamera<PinholeCamera>(pinhole, pose),
+  CHECK_THROWS_WITH(PosedCamera<PinholeCamera>(unposed, pose),
                     "PosedCamera: camera_from_world must be finite, got NaN or infinity");
   pose = {};
   pose.rotation.coeffs().setZero();
-  CHECK_THROWS_WITH(PosedCamera<PinholeCamera>(pinhole, pose),
+  CHECK_THROWS_WITH(PosedCamera<PinholeCamera>(unposed, pose),
                     "PosedCamera: norm of camera_from_world's quaternion must be near 1, got 0");
 }

@@ -14,7 +14,7 @@ using decant::Pose;
 using decant::PoseTrack;
 using Vector = decant::Vector3<double>;
 
-const double pi = std::numbers::pi;
+using std::numbers::pi;
 const double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
 Eigen::Quaterniond turn(double angle, const Vector& axis) {

@@ -19,10 +19,10 @@ namespace {
 /// Ellipses at random places, moved by (u, v).
 Mask blobs(unsigned seed, double u, double v) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> place(80, 160), radius(8, 30);
+  std::uniform_real_distribution<double> place(80, 160), half_axis(8, 30);
   Mask mask = Mask::Zero(240, 240);
   for (int k = 0; k < 4; ++k) {
-    const double x = place(random) + u, y = place(random) + v, a = radius(random), b = radius(random);
+    const double x = place(random) + u, y = place(random) + v, a = half_axis(random), b = half_axis(random);
     for (Index row = 0; row < mask.rows(); ++row) {
       for (Index column = 0; column < mask.cols(); ++column) {
         const double dx = (static_cast<double>(column) - x) / a, dy = (static_cast<double>(row) - y) / b;

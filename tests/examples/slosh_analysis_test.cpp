@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -19,7 +20,7 @@ using namespace example;
 
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
+using std::numbers::pi;
 
 template <class Signal>
 Record sampled(double begin, double end, double step, Signal&& signal) {

@@ -17,7 +17,7 @@ using Vector = decant::Vector3<double>;
 
 namespace {
 
-enum class Walls { Boxes, Meshes };
+enum class Plates { Boxes, Meshes };
 
 struct Outflow {
   double exponent = 0;   // of the flow over the height
@@ -27,14 +27,14 @@ struct Outflow {
 
 /// A slit of 4 cm in the floor of a vessel 16 cm wide, periodic across, 24 cm of liquid at rest at first. Read from 85
 /// to 40 % of the height: off the start, and off the dip of the surface above the slit.
-Outflow pour_out(double spacing, Walls walls) {
+Outflow pour_out(double spacing, Plates walls) {
   const double slit = 0.04, length = 0.16, height = 0.24, thickness = 0.02;
   const int width = 6;
   auto simulator = decant_test::slice(spacing, width);
   const auto add = [&](const char* name, double low_x, double high_x, double low_z, double high_z) {
     const double past = 3 * spacing;  // over both ends of the period
     const decant::Box box{{low_x, -past, low_z}, {high_x, width * spacing + past, high_z}};
-    simulator.add_body(name, walls == Walls::Boxes ? decant::BodyShape(box) : decant::BodyShape(box.mesh()));
+    simulator.add_body(name, walls == Plates::Boxes ? decant::BodyShape(box) : decant::BodyShape(box.mesh()));
   };
   add("left wall", -0.03, 0, 0, 1.5 * height);
   add("right wall", length, length + 0.03, 0, 1.5 * height);
@@ -114,13 +114,13 @@ void check(const Outflow& outflow) {
 // sqrt(1 - (0.619 / 4)^2) for the speed at which the surface sinks).
 
 TEST_CASE("outflow through a slit follows Torricelli") {
-  check(pour_out(0.008, Walls::Meshes));  // 0.651, jet at 0.975
+  check(pour_out(0.008, Plates::Meshes));  // 0.651, jet at 0.975
 }
 
 TEST_CASE("outflow through a slit between boxes follows Torricelli", "[slow]") {
   // Edges of analytic solids are felt as planes, so the slit is too narrow by a part of a spacing: 0.589 at 5 spacings.
-  const Outflow coarse = pour_out(0.008, Walls::Boxes), middle = pour_out(0.005, Walls::Boxes),
-                fine = pour_out(0.004, Walls::Boxes);
+  const Outflow coarse = pour_out(0.008, Plates::Boxes), middle = pour_out(0.005, Plates::Boxes),
+                fine = pour_out(0.004, Plates::Boxes);
   CAPTURE(coarse.exponent, coarse.discharge, coarse.speed);
   CHECK(std::abs(coarse.exponent - 0.5) < 0.05);
   CHECK(std::abs(coarse.speed - 1) < 0.05);

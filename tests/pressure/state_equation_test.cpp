@@ -93,7 +93,7 @@ TEMPLATE_TEST_CASE("StateEquation: pressure of a density and speed of sound", ""
 }
 
 TEMPLATE_TEST_CASE("StateEquation is the symmetric pair sum with walls", "", float, double) {
-  using Kernel = CubicSpline<double>;
+  using Spline = CubicSpline<double>;
   auto liquid = squeezed_ball<TestType>(0.0);
   Index pressed = 0;
   liquid.fluid.density.maxCoeff(&pressed);  // the wall's push is proportional to the pressure
@@ -111,7 +111,7 @@ TEMPLATE_TEST_CASE("StateEquation is the symmetric pair sum with walls", "", flo
     for (Index j = 0; j < liquid.fluid.size(); ++j) {
       const Vector3<double> x = (liquid.fluid.position.col(i) - liquid.fluid.position.col(j)).template cast<double>();
       expected -= static_cast<double>(liquid.fluid.mass[j]) * (term(i) + term(j)) *
-                  Kernel::derivative_over_radius(x.norm(), h) * x;
+                  Spline::derivative_over_radius(x.norm(), h) * x;
     }
     worst = std::max(worst, (expected - got.col(i).template cast<double>()).norm());
     largest = std::max(largest, expected.norm());
@@ -213,7 +213,7 @@ TEMPLATE_TEST_CASE("StateEquationSchenck2017 is short of a factor of density squ
 }
 
 TEMPLATE_TEST_CASE("StateEquationSchenck2017 is the printed sum", "", float, double) {
-  using Kernel = CubicSpline<double>;
+  using Spline = CubicSpline<double>;
   auto liquid = squeezed_ball<TestType>(0.0);
   Index pressed = 0;
   liquid.fluid.density.maxCoeff(&pressed);  // the wall's push is proportional to the pressure
@@ -229,7 +229,7 @@ TEMPLATE_TEST_CASE("StateEquationSchenck2017 is the printed sum", "", float, dou
     for (Index j = 0; j < liquid.fluid.size(); ++j) {
       const Vector3<double> x = (liquid.fluid.position.col(i) - liquid.fluid.position.col(j)).template cast<double>();
       force -= static_cast<double>(liquid.fluid.mass[j]) / density(j) * (term(i) + term(j)) *
-               Kernel::derivative_over_radius(x.norm(), h) * x;
+               Spline::derivative_over_radius(x.norm(), h) * x;
     }
     worst = std::max(worst, (force / density(i) - got.col(i).template cast<double>()).norm());
     largest = std::max(largest, (force / density(i)).norm());

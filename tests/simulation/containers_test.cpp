@@ -12,6 +12,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -31,7 +32,7 @@ using namespace decant;
 namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::infinity();
-constexpr double pi = 3.14159265358979323846;
+using std::numbers::pi;
 
 // Round walls are polygons, at most 0.03 mm beyond the circle (boundary/shapes.hpp); the rest is rounding of floats.
 constexpr double slack = 0.05e-3;

@@ -4,6 +4,7 @@
 #include <decant/simulation/fill.hpp>
 
 #include <cmath>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -19,7 +20,7 @@ using namespace decant;
 
 namespace {
 
-constexpr double pi = 3.14159265358979323846;
+using std::numbers::pi;
 
 using decant_test::with_spacing;
 

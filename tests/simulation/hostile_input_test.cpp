@@ -26,7 +26,7 @@ namespace {
 using decant_test::block;
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
-constexpr double unbounded = std::numeric_limits<double>::infinity();
+constexpr double infinite = std::numeric_limits<double>::infinity();
 
 SimulatorSettings coarse() { return decant_test::with_spacing(0.008); }
 
@@ -90,7 +90,7 @@ TEST_CASE("hostile: settings out of range are refused in one line that names the
       {"density", [](SimulatorSettings& s) { s.liquid.density = 0; }},
       {"density", [](SimulatorSettings& s) { s.liquid.density = -1; }},
       {"density", [](SimulatorSettings& s) { s.liquid.density = not_a_number; }},
-      {"density", [](SimulatorSettings& s) { s.liquid.density = unbounded; }},
+      {"density", [](SimulatorSettings& s) { s.liquid.density = infinite; }},
       {"viscosity", [](SimulatorSettings& s) { s.liquid.dynamic_viscosity = -1; }},
       {"viscosity", [](SimulatorSettings& s) { s.liquid.dynamic_viscosity = 1e9; }},
       {"viscosity", [](SimulatorSettings& s) { s.liquid.dynamic_viscosity = not_a_number; }},
@@ -102,7 +102,7 @@ TEST_CASE("hostile: settings out of range are refused in one line that names the
        }},
       {"gravity",
        [](SimulatorSettings& s) {
-         s.gravity = {0, unbounded, 0};
+         s.gravity = {0, infinite, 0};
        }},
       {"gravity",
        [](SimulatorSettings& s) {
@@ -113,7 +113,7 @@ TEST_CASE("hostile: settings out of range are refused in one line that names the
       {"support_in_spacings", [](SimulatorSettings& s) { s.support_in_spacings = not_a_number; }},
       {"largest_step", [](SimulatorSettings& s) { s.largest_step = 0; }},
       {"largest_step", [](SimulatorSettings& s) { s.largest_step = not_a_number; }},
-      {"largest_step", [](SimulatorSettings& s) { s.largest_step = unbounded; }},
+      {"largest_step", [](SimulatorSettings& s) { s.largest_step = infinite; }},
       {"courant_number", [](SimulatorSettings& s) { s.courant_number = 0; }},
       {"courant_number", [](SimulatorSettings& s) { s.courant_number = not_a_number; }},
       {"courant_number", [](SimulatorSettings& s) { s.courant_number = 5; }},
@@ -138,7 +138,7 @@ TEST_CASE("hostile: settings out of range are refused in one line that names the
 TEMPLATE_TEST_CASE("hostile: particles that are not finite are refused and none is added", "", float, double) {
   auto simulator = half_full_box<TestType>();
   const Index count = simulator.fluid().size();
-  for (const double bad : {not_a_number, unbounded, -unbounded}) {
+  for (const double bad : {not_a_number, infinite, -infinite}) {
     PointArray<TestType> good = PointArray<TestType>::Constant(3, 2, TestType(0.01));
     PointArray<TestType> wrong = good;
     wrong(1, 1) = static_cast<TestType>(bad);
@@ -162,7 +162,7 @@ TEST_CASE("hostile: poses that are not finite or not in order are refused") {
   Pose bent;
   bent.rotation.coeffs() << 0, 0, 0, 0;
   Pose turned;
-  turned.rotation.coeffs() << unbounded, 0, 0, 1;
+  turned.rotation.coeffs() << infinite, 0, 0, 1;
   CHECK(refusal([&] { PoseTrack{lost}; }).find("pose") != std::string::npos);
   CHECK(refusal([&] { PoseTrack{turned}; }).find("pose") != std::string::npos);
   CHECK(refusal([&] { PoseTrack{bent}; }).find("quaternion") != std::string::npos);
@@ -225,7 +225,7 @@ TEMPLATE_TEST_CASE("hostile: frame times out of range change nothing", "", float
   auto simulator = half_full_box<TestType>();
   const auto before = simulator.fluid();
   const double time = simulator.time();
-  for (const double frame : {-0.01, not_a_number, unbounded, -unbounded}) {
+  for (const double frame : {-0.01, not_a_number, infinite, -infinite}) {
     const StepReport report = simulator.step(frame);
     CHECK(report.status == StepStatus::BadTimeStep);
     CHECK_FALSE(report.advanced());
@@ -243,7 +243,7 @@ TEMPLATE_TEST_CASE("hostile: frame times out of range change nothing", "", float
 
 TEMPLATE_TEST_CASE("hostile: state that the user breaks between frames fails the frame and stays as it was", "", float,
                    double) {
-  for (const double bad : {not_a_number, unbounded, -unbounded, 1e30}) {
+  for (const double bad : {not_a_number, infinite, -infinite, 1e30}) {
     for (const bool in_velocity : {true, false}) {
       for (const double fixed : {0.0, 0.001}) {
         INFO(bad << (in_velocity ? " velocity" : " position") << " fixed step " << fixed);
@@ -430,7 +430,7 @@ TEST_CASE("hostile: inlets and fills out of range are refused in one line") {
         s.direction = {0, 0, 0};
       }),
       with([](InletSettings& s) {
-        s.direction = {unbounded, 0, 0};
+        s.direction = {infinite, 0, 0};
       }),
       with([](InletSettings& s) { s.radius = 0; }),
       with([](InletSettings& s) { s.radius = -1; }),

@@ -17,14 +17,14 @@ using namespace decant;
 
 namespace {
 
-constexpr double d = 0.008;  // spacing [m]
+constexpr double spacing = 0.008;  // [m]
 
-SimulatorSettings settings_for(int threads) { return decant_test::with_spacing(d, threads); }
+SimulatorSettings settings_for(int threads) { return decant_test::with_spacing(spacing, threads); }
 
 // n^3 particles on a lattice of one spacing from a corner on.
 template <class Scalar>
 PointArray<Scalar> cube(int n, const Vector3<double>& corner) {
-  return decant_test::block<Scalar>(n, n, n, d, corner);
+  return decant_test::block<Scalar>(n, n, n, spacing, corner);
 }
 
 template <class Parts>
@@ -89,7 +89,7 @@ TEMPLATE_TEST_CASE("step report: contents are those particles that were put into
     CHECK(report.contents[1].body == first);
     CHECK(report.contents[1].particles == 216);
     // single precision masses
-    CHECK(report.contents[1].volume == Approx(216 * d * d * d).epsilon(1e-6));
+    CHECK(report.contents[1].volume == Approx(216 * spacing * spacing * spacing).epsilon(1e-6));
     CHECK(report.particles == 216 + 27 + 64);
   }
 }
@@ -116,7 +116,7 @@ TEST_CASE("step report: liquid that is poured leaves one container's entry and e
     CHECK(in_cup <= inside(simulator, cup, jug, jug.max.z() + 1e-4));
     CHECK(in_basin >= inside(simulator, below, basin, basin.max.z() - 1e-4));
     CHECK(in_basin <= inside(simulator, below, basin, basin.max.z() + 1e-4));
-    CHECK(report.contents[0].volume == Approx(static_cast<double>(in_cup) * d * d * d).epsilon(1e-6));
+    CHECK(report.contents[0].volume == Approx(static_cast<double>(in_cup) * spacing * spacing * spacing).epsilon(1e-6));
     on_the_way = on_the_way || (in_cup > 20 && in_basin > 20 && in_cup + in_basin < 216);
     if (frame < 8) {
       CHECK(in_cup == 216);
