@@ -23,15 +23,15 @@ TEST_CASE("Occlusion takes no memory in a frame") {
   for (const auto& body : decant_test::bodies_before_camera()) {
     surfaces.push_back(std::make_shared<const BoundingVolumeHierarchy>(body.mesh));
   }
-  const PosedCamera<decant::PinholeCamera> pinhole(decant_test::pinhole, decant_test::camera_from_world());
+  const PosedCamera<decant::PinholeCamera> posed(decant_test::pinhole, decant_test::camera_from_world());
   const PosedCamera<decant::DistortedPinholeCamera> lens(decant_test::lens, decant_test::camera_from_world());
-  decant::RayOcclusion<decant::PinholeCamera> rays(pinhole);
+  decant::RayOcclusion<decant::PinholeCamera> rays(posed);
   decant::RayOcclusion<decant::DistortedPinholeCamera> bent_rays(lens);
   for (const auto& surface : surfaces) {
     rays.add(surface);
     bent_rays.add(surface);
   }
-  decant::DepthBuffer<decant::PinholeCamera> buffer(pinhole);
+  decant::DepthBuffer<decant::PinholeCamera> buffer(posed);
   decant::DepthBuffer<decant::DistortedPinholeCamera> cast(lens);
   std::mt19937 random(1);
   decant::PointArray<float> points(3, 2000);

@@ -62,12 +62,12 @@ TEST_CASE("a shaken tank sloshes as Faltinsen and others measured", "[slow]") {
 
   // the motion is that of the scene which comes with the library
   const auto scene = decant::read_scene(decant_test::repository("examples/scenes/sloshing_faltinsen.json"));
-  const double depth = 0.6, length = 1.73, spacing = 0.04;
-  const int width = 4;
-  auto simulator = decant_test::slice(spacing, width);
+  const double filled = 0.6, length = 1.73, spacing = 0.04;
+  const int across = 4;
+  auto simulator = decant_test::slice(spacing, across);
   const auto tank = simulator.add_body("tank", decant::BoxInside{{0, -0.5, 0}, {length, 0.5, 1.15}, 0.05, {}},
                                        scene.bodies.at(0).motion);
-  auto places = decant_test::slice_block(length, width, depth, spacing);
+  auto places = decant_test::slice_block(length, across, filled, spacing);
   places.row(0).array() *= static_cast<float>(length / spacing / std::round(length / spacing));
   places.row(0).array() += static_cast<float>(scene.bodies.at(0).motion.at(0).translation.x());
   simulator.add_particles(places, decant::PointArray<float>::Zero(3, places.cols()), 0);
@@ -78,9 +78,9 @@ TEST_CASE("a shaken tank sloshes as Faltinsen and others measured", "[slow]") {
     gauges.observe(simulator.fluid(), {1});
     const double wall = simulator.bodies()[tank].motion.at(simulator.time()).translation.x();
     const auto level =
-        gauges.level(wall + 0.05, 0.5 * width * spacing, [&](const auto& x) { return x.z() < 1.5 * spacing; });
+        gauges.level(wall + 0.05, 0.5 * across * spacing, [&](const auto& x) { return x.z() < 1.5 * spacing; });
     simulated.time.push_back(simulator.time());
-    simulated.value.push_back(level.value_or(0) - depth);
+    simulated.value.push_back(level.value_or(0) - filled);
   }
 
   double squared = 0, measured_squared = 0;
