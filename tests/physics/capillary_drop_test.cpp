@@ -85,34 +85,35 @@ Drop watch(int spacings_per_radius, double jitter, double stretch) {
 
 }  // namespace
 
-// The bar would be the pressure within 20 % at 8 spacings per radius, and the frequency within 10 %. Neither is met:
-// pairs that pull along the surface feed the noise of its particles, whatever the sub-step, and the friction that keeps
-// them together takes the oscillation away.
+// The bars are the pressure within 20 % at 8 spacings per radius, and the frequency within 10 %. The first is just met,
+// the second is not: pairs that pull along the surface feed the noise of its particles, whatever the sub-step, and the
+// friction that keeps them together takes the oscillation away.
 
-TEST_CASE("a drop at rest keeps its particles and most of its pressure") {
-  // 0.66 of 2 sigma / R at 8 spacings per radius, at a speed of 0.29; with a friction of 0.2, 5 to 9 % leave, at 0.75
-  for (const double jitter : {0.05, 0.1}) {
+TEST_CASE("a drop at rest keeps its particles and its pressure") {
+  // 0.80 to 0.83, at a speed of 0.04, from lattices in and out of order. A friction of 1 gives 0.65 at 0.3, and 2 %
+  // leave the orderly one. The lowest is so close to the bar that rounding decides, so the guard is a little below
+  for (const double jitter : {0.03, 0.1}) {
     const Drop drop = watch(8, jitter, 1);
     CAPTURE(jitter, drop.pressure, drop.speed, drop.lost);
-    CHECK(drop.pressure > 0.55);
+    CHECK(drop.pressure > 0.77);
     CHECK(drop.pressure < 1.2);
-    CHECK(drop.speed < 0.45);
+    CHECK(drop.speed < 0.1);
     CHECK(drop.lost == 0);
   }
 }
 
 TEST_CASE("a stretched drop shortens") {
-  // 0.61 at first; 0.45 after the half period in which an ideal one goes to -0.61
+  // 0.61 at first; 0.41 after the half period in which an ideal one goes to -0.61
   const Drop drop = watch(8, 0.05, 1.2);
   CAPTURE(drop.stretched, drop.at_half, drop.lost);
   CHECK(drop.at_half < 0.9 * drop.stretched);
-  CHECK(drop.lost < 0.05);  // 1.5 %
+  CHECK(drop.lost == 0);
 }
 
 TEST_CASE("a drop of 12 spacings per radius has the pressure of theory", "[slow]") {
   const Drop drop = watch(12, 0.05, 1);
   CAPTURE(drop.pressure, drop.speed, drop.lost);
-  CHECK(std::abs(drop.pressure - 1) < 0.2);  // 0.86
-  CHECK(drop.speed < 0.5);                   // 0.33
-  CHECK(drop.lost < 1e-3);                   // one particle of 7,238
+  CHECK(std::abs(drop.pressure - 1) < 0.1);  // 0.99
+  CHECK(drop.speed < 0.2);                   // 0.10
+  CHECK(drop.lost == 0);
 }
