@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 # Installs what is missing, builds everything and runs every test but those labelled `long` (a quarter of an hour).
 # Ends with the line `N passed, N failed`; the exit status is 0 only if there are tests and all of them passed.
-# Environment: DECANT_TEST_JOBS, how many compilers and tests run side by side (all cores unless given);
+# Environment: DECANT_TEST_JOBS, how many compilers and tests run side by side (all cores unless given; fewer compilers
+# where memory is short);
 # DECANT_SHARED_DATA_DIR, a folder of measurements that some tests compare with, ../shared/data if there is one;
 # DECANT_BUILD_DIR, build/ unless given; CI=true makes warnings errors and builds the benchmarks, too.
 # Arguments go to ctest instead: ./tests/run.sh -L long, ./tests/run.sh -LE 'slow|long'
@@ -10,6 +11,9 @@ set -uo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 jobs=${DECANT_TEST_JOBS:-$(nproc)}
+# a compiler takes up to 3 GB
+compilers=$(awk '/^MemAvailable/ { print int($2 / 1024 / 3000) }' /proc/meminfo 2>/dev/null || echo "$jobs")
+compilers=$((compilers < 1 ? 1 : compilers > jobs ? jobs : compilers))
 build=${DECANT_BUILD_DIR:-build}
 for_ci=OFF
 if [[ ${CI:-} == true ]]; then
@@ -26,7 +30,7 @@ give_up() {
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=ON -DDECANT_BUILD_EXAMPLES=ON \
   -DDECANT_BUILD_BENCHMARKS="$for_ci" -DDECANT_WARNINGS_AS_ERRORS="$for_ci" \
   -DDECANT_SHARED_DATA_DIR="${DECANT_SHARED_DATA_DIR:-}" || give_up "Configuring failed."
-cmake --build "$build" --parallel "$jobs" || give_up "Building failed."
+cmake --build "$build" --parallel "$compilers" || give_up "Building failed."
 
 if (($# == 0)); then
   set -- --label-exclude '^long$'
