@@ -29,9 +29,9 @@ namespace decant {
 /// damped as well, by a friction that scales with sqrt(sigma h / rho_0) and acts in a layer of about h: it vanishes as
 /// the spacing does. With the default solver, a drop at rest stays together; the pressure in it is 0.80 to 0.83 and
 /// 0.99 of the analytic 2 sigma / R at 8 and 12 spacings per radius, but drops do not swing: their lowest mode is
-/// damped away within a period. With a friction of 1, sub-steps are five times as long, the pressure is 0.65 and up to
-/// 5 % of the particles leave; with 0.2, a tenth. Walls complete the support: no surface between liquid and wall, and
-/// liquid meets a wall at about a right angle. A tension of zero costs nothing.
+/// damped away within a period. With a friction of 1, sub-steps are up to four times as long, the pressure is 0.65 and
+/// up to 5 % of the particles leave; with 0.2, a tenth. Walls complete the support: no surface between liquid and wall,
+/// and liquid meets a wall at about a right angle. A tension of zero costs nothing.
 template <class ScalarType>
 struct SurfaceTension {
   using Scalar = ScalarType;
