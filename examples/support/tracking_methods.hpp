@@ -83,9 +83,13 @@ inline TrackingResult track_adapting(const decant::Recording& recording, const T
                                      const std::function<void(std::size_t)>& progress) {
   decant::FixedLagSettings settings;
   settings.threads = {options.threads};
+  TrackingOptions coarse = options;
+  coarse.spacing = 1.5 * options.spacing;
+  const decant::SilhouetteCorrector<> corrector;
   return track_recording(
       recording,
-      decant::FixedLagTracker(tracker_for(recording, model, decant::SilhouetteCorrector<>(), options),
+      decant::FixedLagTracker(tracker_for(recording, model, corrector, options),
+                              tracker_for(recording, model_of<TrackingParts>(recording, coarse), corrector, coarse),
                               uncertain_parameters(recording), settings),
       options, truth_masks, progress);
 }

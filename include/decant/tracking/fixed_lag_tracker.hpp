@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// A tracker that learns, while it runs, a few parameters of its model: what the corrections of the last frames have in
-/// common, so that forecasts, which nothing corrects, get better.
+/// A tracker that learns, while it runs, a few parameters of its model from what it has seen in the last seconds, so
+/// that forecasts, which nothing corrects, get better.
 
 #include <algorithm>
 #include <cmath>
@@ -33,26 +33,34 @@ struct UncertainParameter {
 
 /// Settings of FixedLagTracker.
 struct FixedLagSettings {
-  int lag = 10;                   ///< frames, >= 2: as often parameters are adapted, and as far back
+  int lag = 90;                   ///< frames, >= 2: as far back simulations begin that parameters are judged by
+  int interval = 10;              ///< frames, 1 .. lag: as often parameters are adapted
   int cell_px = 20;               ///< see SilhouetteCells, >= 1
-  double cell_deviation = 0.5;    ///< of a cell's share of liquid, > 0: see HypothesisFilterSettings
+  double cell_deviation = 0.2;    ///< of a cell's share of liquid, > 0; with more, thin jets teach less
   double largest_residual = 0.5;  ///< a cell that is off by more counts as if by this, > 0
   double probe = 0.7;             ///< how far parameters are moved for their effect to be seen [deviations], > 0
-  double damping = 1.2;           ///< of a step: one over the variance of a parameter's change [1/deviations^2], >= 0
-  double forgetting = 0.2;        ///< pull towards zero: one over a parameter's variance, per lag, >= 0
-  double largest_step = 1;        ///< of a parameter in one lag [deviations], > 0
+  double largest_step = 1.5;      ///< of a parameter at a time [deviations], > 0
   double largest_value = 2.5;     ///< of a parameter [deviations], > 0
+  /// As much has a parameter to change [deviations] for the frames of the lag to be run through and corrected once
+  /// more, since what it spoiled before it was known may still be there; >= 0.
+  double retrack_after = 0.5;
   double least_gain = 1;          ///< a step is taken if it lowers the misfit by as much [nat], >= 0
   double delay_deviation = 0.05;  ///< how late poses may be [s]; 0: they are taken as they come
   Threads threads{};              ///< over which simulations are shared out
 };
 
-/// Every `lag` frames it goes back to the state of `lag` frames ago and runs on from there without correction: as
-/// things are, and with each parameter moved a little. What moves the predicted silhouettes of these frames towards the
-/// observed ones is a linear least-squares problem (Gauss-Newton, with the parameters' expected deviations as prior).
-/// If the solution, tried, fits better, the frames are run through once more with it, and corrected.
-/// One of the parameters is how late bodies' poses are behind the masks: then poses of the last moments are continued
-/// as they moved. It costs about (parameters + 4) simulations in place of one, and allocates.
+/// Every `interval` frames it goes back to where things were `lag` frames ago, or at the beginning, and runs on from
+/// there without correction: as things are, and with each parameter moved a little. What moves the predicted
+/// silhouettes of these frames towards the observed ones is a linear least-squares problem (a step of Gauss and Newton,
+/// with the parameters' expected deviations as prior). The step is taken if it is seen to fit better, from the next
+/// frame on. One of the parameters is how late bodies' poses are behind the masks: then poses of the last moments are
+/// continued as they moved.
+///
+/// The lag is long because a wrong parameter adds up: a tilt that is seen late shows when the jet begins. In the next
+/// third of a second it is hardly told from friction of the air, and corrections have hidden most of it.
+///
+/// It costs (parameters + 3) * lag / interval simulations beside the tracker's own, and allocates. These need no fine
+/// particles: hand it a scout of 1.5 times the spacing, which takes a fifth of the time.
 template <class TrackerType>
 class FixedLagTracker {
  public:
@@ -61,13 +69,21 @@ class FixedLagTracker {
   using Settings = FixedLagSettings;
   using Parameter = UncertainParameter<Model>;
 
-  /// Throws std::invalid_argument if a setting is out of range.
+  /// Parameters are judged by runs of the tracker itself. Throws std::invalid_argument if a setting is out of range.
   FixedLagTracker(Tracker tracker, std::vector<Parameter> parameters, const Settings& settings = {})
+      : FixedLagTracker(tracker, tracker, std::move(parameters), settings) {}
+
+  /// @param scout the same scene, at the same time, with the same cameras; its particles may be fewer. Parameters are
+  ///   judged by runs of it.
+  FixedLagTracker(Tracker tracker, Tracker scout, std::vector<Parameter> parameters, const Settings& settings = {})
       : tracker_(std::move(tracker)),
         past_(tracker_),
+        scout_(std::move(scout)),
         parameters_(std::move(parameters)),
         settings_(settings),
         cells_(settings.cell_px) {
+    expects(scout_.cameras() == tracker_.cameras(), "FixedLagTracker: cameras of the scout",
+            std::to_string(tracker_.cameras()) + ", as of the tracker", scout_.cameras());
     const auto positive = [](double value, const char* name) {
       expects(value > 0 && std::isfinite(value), name, "> 0", value);
     };
@@ -77,8 +93,9 @@ class FixedLagTracker {
     positive(settings.probe, "FixedLagTracker: probe");
     positive(settings.largest_step, "FixedLagTracker: largest_step");
     positive(settings.largest_value, "FixedLagTracker: largest_value");
-    expects(settings.damping >= 0 && settings.forgetting >= 0 && settings.damping + settings.forgetting > 0,
-            "FixedLagTracker: damping and forgetting", ">= 0, and one of them > 0", settings.damping);
+    expects(settings.interval >= 1 && settings.interval <= settings.lag, "FixedLagTracker: interval [frames]",
+            ">= 1 and <= lag", settings.interval);
+    expects(settings.retrack_after >= 0, "FixedLagTracker: retrack_after [deviations]", ">= 0", settings.retrack_after);
     expects(settings.least_gain >= 0, "FixedLagTracker: least_gain [nat]", ">= 0", settings.least_gain);
     expects(settings.delay_deviation >= 0 && settings.delay_deviation <= 1, "FixedLagTracker: delay_deviation [s]",
             "0 .. 1", settings.delay_deviation);
@@ -88,9 +105,10 @@ class FixedLagTracker {
               "one that can be applied", "no function");
     }
     state_.setZero(static_cast<Index>(parameters_.size()) + (settings.delay_deviation > 0 ? 1 : 0));
+    expected_ = tracked_ = state_;
   }
 
-  /// As Tracker::track; a frame with which a lag ends takes as long as all simulations of it.
+  /// As Tracker::track; a frame with which an interval ends takes as long as all simulations of it.
   [[nodiscard]] FrameReport track(const TrackerFrame& frame) noexcept {
     if (tracker_.check(frame) != FrameStatus::Ok) {
       return tracker_.track(frame);
@@ -110,15 +128,12 @@ class FixedLagTracker {
         mask.shares = blurred(cells_.shares(tracker_.observed(mask.camera)));
       }
     }
-    if (seen_.size() - first_ == static_cast<std::size_t>(settings_.lag)) {
+    if (++since_adapted_ == settings_.interval) {
+      since_adapted_ = 0;
       adapt();
-      past_ = tracker_;
-      // of what is past only poses are still asked for, of delayed bodies
-      for (Seen& each : seen_) {
-        each.masks.clear();
-      }
-      seen_.erase(seen_.begin(), seen_.end() - static_cast<std::ptrdiff_t>(std::min(seen_.size(), kept_frames)));
-      first_ = seen_.size();
+    }
+    if (seen_.size() - first_ > static_cast<std::size_t>(settings_.lag)) {
+      leave_behind();
     }
     return report;
   }
@@ -175,10 +190,14 @@ class FixedLagTracker {
     return {turn * last.pose.rotation, last.pose.translation + ahead * moved.linear};
   }
 
-  FrameReport show(Tracker& tracker, const Seen& seen, const Eigen::VectorXd& state, bool correcting) const noexcept {
+  void apply(Tracker& tracker, const Eigen::VectorXd& state) const noexcept {
     for (std::size_t k = 0; k < parameters_.size(); ++k) {
       parameters_[k].apply(tracker.model(), state[static_cast<Index>(k)] * parameters_[k].deviation);
     }
+  }
+
+  FrameReport show(Tracker& tracker, const Seen& seen, const Eigen::VectorXd& state, bool correcting) const noexcept {
+    apply(tracker, state);
     std::vector<TrackedPose> poses = seen.poses;
     if (const double late = delay(state); late != 0) {
       for (TrackedPose& pose : poses) {
@@ -196,7 +215,7 @@ class FixedLagTracker {
 
   /// Differences of shares of liquid, observed minus predicted, of all frames since the past state, uncorrected.
   Eigen::VectorXd residual(const Eigen::VectorXd& state) const noexcept {
-    Tracker tracker = past_;
+    Tracker tracker = scout_;
     std::vector<double> all;
     for (std::size_t k = first_; k < seen_.size(); ++k) {
       if (!show(tracker, seen_[k], state, false).advanced()) {
@@ -231,7 +250,39 @@ class FixedLagTracker {
   double misfit(const Eigen::VectorXd& residual, const Eigen::VectorXd& state) const noexcept {
     const double limit = settings_.largest_residual, variance = settings_.cell_deviation * settings_.cell_deviation;
     return 0.5 * residual.cwiseMax(-limit).cwiseMin(limit).squaredNorm() / variance +
-           0.5 * settings_.forgetting * state.squaredNorm();
+           0.5 * (state - expected_).squaredNorm();
+  }
+
+  /// The past moves on by a frame. What was learned while it was in sight is what is expected from then on.
+  void leave_behind() noexcept {
+    if (show(past_, seen_[first_], state_, true).advanced() && show(scout_, seen_[first_], state_, true).advanced()) {
+      seen_[first_].masks.clear();  // of what is past only poses are still asked for, of delayed bodies
+      ++first_;
+    } else {  // from where the tracker is: what it has seen until now teaches nothing more
+      past_ = tracker_;
+      scout_ = tracker_;
+      first_ = seen_.size();
+    }
+    expected_ = state_;
+    if (first_ > kept_frames) {
+      seen_.erase(seen_.begin(), seen_.begin() + static_cast<std::ptrdiff_t>(first_ - kept_frames));
+      first_ = kept_frames;
+    }
+  }
+
+  /// What is in sight is run through and corrected once more, with what has been learned since the last time.
+  void retrack() noexcept {
+    if ((state_ - tracked_).cwiseAbs().maxCoeff() < settings_.retrack_after) {
+      return;
+    }
+    Tracker again = past_;
+    for (std::size_t k = first_; k < seen_.size(); ++k) {
+      if (!show(again, seen_[k], state_, true).advanced()) {
+        return;
+      }
+    }
+    tracker_ = std::move(again);
+    tracked_ = state_;
   }
 
   void adapt() noexcept {
@@ -242,59 +293,57 @@ class FixedLagTracker {
                      [&](const Seen& seen) { return std::any_of(seen.masks.begin(), seen.masks.end(), informs); })) {
       return;
     }
-    std::vector<Eigen::VectorXd> outcome(static_cast<std::size_t>(count + 1));
-    parallel_ranges(count + 1, settings_.threads, 1, [&](Index k, Index) {
-      Eigen::VectorXd probe = state_;
-      if (k > 0) {
-        // towards the inside, so that a probe is never beyond what a parameter may be
-        probe[k - 1] += probe[k - 1] > 0 ? -settings_.probe : settings_.probe;
-      }
-      outcome[static_cast<std::size_t>(k)] = residual(probe);
-    });
-    const Eigen::VectorXd& now = outcome[0];
-    if (now.size() == 0) {
+    const Eigen::VectorXd now = residual(state_);
+    if (now.size() == 0 || now.isZero(0)) {  // such as before anything is poured
       return;
     }
+    std::vector<Eigen::VectorXd> outcome(static_cast<std::size_t>(count));
+    parallel_ranges(count, settings_.threads, 1, [&](Index k, Index) {
+      Eigen::VectorXd probe = state_;
+      // towards the inside, so that a probe is never beyond what a parameter may be
+      probe[k] += probe[k] > 0 ? -settings_.probe : settings_.probe;
+      outcome[static_cast<std::size_t>(k)] = residual(probe);
+    });
     Eigen::MatrixXd effect = Eigen::MatrixXd::Zero(now.size(), count);
     for (Index k = 0; k < count; ++k) {
-      const Eigen::VectorXd& moved = outcome[static_cast<std::size_t>(k + 1)];
+      const Eigen::VectorXd& moved = outcome[static_cast<std::size_t>(k)];
       if (moved.size() == now.size()) {
         effect.col(k) = (now - moved) / (state_[k] > 0 ? -settings_.probe : settings_.probe);
       }
     }
     const double limit = settings_.largest_residual, variance = settings_.cell_deviation * settings_.cell_deviation;
     Eigen::MatrixXd normal = effect.transpose() * effect / variance;
-    normal.diagonal().array() += settings_.damping + settings_.forgetting;
+    normal.diagonal().array() += 1;
     const Eigen::VectorXd downhill =
-        effect.transpose() * now.cwiseMax(-limit).cwiseMin(limit) / variance - settings_.forgetting * state_;
+        effect.transpose() * now.cwiseMax(-limit).cwiseMin(limit) / variance - (state_ - expected_);
     const Eigen::VectorXd step = normal.ldlt().solve(downhill);
     if (!step.allFinite()) {
       return;
     }
-    const Eigen::VectorXd trial = (state_ + step.cwiseMax(-settings_.largest_step).cwiseMin(settings_.largest_step))
-                                      .cwiseMax(-settings_.largest_value)
-                                      .cwiseMin(settings_.largest_value);
-    const Eigen::VectorXd tried = residual(trial);
-    if (tried.size() != now.size() || !(misfit(tried, trial) < misfit(now, state_) - settings_.least_gain)) {
-      return;
-    }
-    Tracker again = past_;
-    for (std::size_t k = first_; k < seen_.size(); ++k) {
-      if (!show(again, seen_[k], trial, true).advanced()) {
+    // the effects are those of a small change in something chaotic: where the whole step leads astray, half may not
+    for (const double share : {1.0, 0.5}) {
+      const Eigen::VectorXd trial =
+          (state_ + share * step.cwiseMax(-settings_.largest_step).cwiseMin(settings_.largest_step))
+              .cwiseMax(-settings_.largest_value)
+              .cwiseMin(settings_.largest_value);
+      const Eigen::VectorXd tried = residual(trial);
+      if (tried.size() == now.size() && misfit(tried, trial) < misfit(now, state_) - settings_.least_gain) {
+        state_ = trial;
+        apply(tracker_, state_);
+        retrack();
         return;
       }
     }
-    tracker_ = std::move(again);
-    state_ = trial;
   }
 
-  Tracker tracker_, past_;  ///< past_: as it was before seen_[first_]
+  Tracker tracker_, past_, scout_;  ///< the last two as things were before seen_[first_]
   std::vector<Parameter> parameters_;
   Settings settings_;
   SilhouetteCells cells_;
-  Eigen::VectorXd state_{};  ///< parameters in deviations, then the delay if it is one of them
+  Eigen::VectorXd state_{}, expected_{}, tracked_{};  ///< parameters in deviations, then the delay if it is one of them
   std::vector<Seen> seen_{};
   std::size_t first_ = 0;  ///< of seen_, what came after past_
+  int since_adapted_ = 0;  ///< frames
 };
 
 }  // namespace decant
