@@ -52,15 +52,15 @@ struct FixedLagSettings {
 /// Every `interval` frames it goes back to where things were `lag` frames ago, or at the beginning, and runs on from
 /// there without correction: as things are, and with each parameter moved a little. What moves the predicted
 /// silhouettes of these frames towards the observed ones is a linear least-squares problem (a step of Gauss and Newton,
-/// with the parameters' expected deviations as prior). The step is taken if it is seen to fit better, from the next
-/// frame on. One of the parameters is how late bodies' poses are behind the masks: then poses of the last moments are
-/// continued as they moved.
+/// with the parameters' expected deviations as prior). The step is taken if it is seen to fit better; if it is a large
+/// one, the frames are run through once more with it, and corrected. One of the parameters is how late bodies' poses
+/// are behind the masks: then poses of the last moments are continued as they moved.
 ///
 /// The lag is long because a wrong parameter adds up: a tilt that is seen late shows when the jet begins. In the next
 /// third of a second it is hardly told from friction of the air, and corrections have hidden most of it.
 ///
-/// It costs (parameters + 3) * lag / interval simulations beside the tracker's own, and allocates. These need no fine
-/// particles: hand it a scout of 1.5 times the spacing, which takes a fifth of the time.
+/// It costs about (parameters + 3) * lag / interval simulations beside the tracker's own, and allocates. These need no
+/// fine particles: hand it a scout of 1.5 times the spacing, which takes a fifth of the time.
 template <class TrackerType>
 class FixedLagTracker {
  public:
