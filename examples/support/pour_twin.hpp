@@ -273,9 +273,9 @@ namespace detail {
 inline constexpr double calming = 0.1;  ///< before the recording begins [s]
 
 /// Runs the reality and writes the recording. For any composition with the bodies in this order: container, pan.
-/// @param solver its name, for the truth.
+/// @param solver_name for the truth.
 template <class Parts>
-void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::string& solver,
+void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::string& solver_name,
                  const std::filesystem::path& folder, const std::function<void(double)>& progress) {
   using namespace decant;
   const PourContainer container = pour_container(twin.container);
@@ -397,7 +397,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   truth["sticky_walls"] = hidden.sticky_walls;
   truth["kinematic_viscosity_m2_s"] = hidden.kinematic_viscosity;
   truth["latency_s"] = hidden.latency;
-  truth["solver"] = solver;
+  truth["solver"] = solver_name;
   truth["seed"] = twin.seed;
   truth["spacing_mm"] = 1e3 * twin.spacing;
   truth["initial_ml"] = 1e6 * filled.volume;

@@ -138,15 +138,17 @@ class MeshWall {
     if (nodes.crossed[cell_number(i, j, k)]) {
       return LookUp::Crossed;
     }
-    NodeValues mean = NodeValues::Zero();
+    StoredValues stored = StoredValues::Zero();
     for (int corner = 0; corner < 8; ++corner) {
       const int di = corner & 1, dj = (corner >> 1) & 1, dk = corner >> 2;
       const double weight = (di ? t[0] : 1 - t[0]) * (dj ? t[1] : 1 - t[1]) * (dk ? t[2] : 1 - t[2]);
-      mean += weight * nodes.value[node_number(i + di, j + dj, k + dk)].cast<double>();
+      stored += static_cast<float>(weight) * nodes.value[node_number(i + di, j + dj, k + dk)];
     }
-    result.share = plane_.share(mean[0]);
+    const NodeValues mean = stored.cast<double>();
+    const auto [share, slope] = plane_.share_and_slope(mean[0]);
+    result.share = share;
     result.distance = mean[4];
-    const NodeValues scaled = plane_.slope(mean[0]) * mean;
+    const NodeValues scaled = slope * mean;
     result.gradient = scaled.segment<3>(1);
     result.moment << scaled[5], scaled[6], scaled[7], scaled[6], scaled[8], scaled[9], scaled[7], scaled[9], scaled[10];
     return LookUp::Found;
@@ -187,8 +189,9 @@ class MeshWall {
   /// A node holds the distance of a plane that would have the same share, the gradient over that plane's slope, the
   /// true distance, and the moment over that slope (xx, xy, xz, yy, yz, zz). Near a plane all of these are linear or
   /// constant in space, so interpolation is exact there, although the share itself is steep.
-  using NodeValues = Eigen::Matrix<double, 11, 1>;
-  using StoredValues = Eigen::Matrix<float, 11, 1>;
+  /// The twelfth value is nothing: with it, four at a time are read and weighted.
+  using NodeValues = Eigen::Matrix<double, 12, 1>;
+  using StoredValues = Eigen::Matrix<float, 12, 1>;
   struct Block {
     std::array<StoredValues, block_nodes * block_nodes * block_nodes> value;
     std::bitset<block_cells * block_cells * block_cells> crossed;
@@ -396,7 +399,7 @@ class MeshWall {
       // close to the reach share and slope tend to zero, and their quotients to rounding: the nearest point tells
       // better
       if (distance < 0.9 * reach()) {
-        NodeValues node;
+        NodeValues node = NodeValues::Zero();
         node[0] = distance;
         node.segment<3>(1) = sample.gradient / plane_.slope(distance);
         node[4] = static_cast<double>(stored[4]);
@@ -407,7 +410,7 @@ class MeshWall {
   }
 
   static void set_moment(NodeValues& node, const Eigen::Matrix3d& moment) noexcept {
-    node.tail<6>() << moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2);
+    node.segment<6>(5) << moment(0, 0), moment(0, 1), moment(0, 2), moment(1, 1), moment(1, 2), moment(2, 2);
   }
 
   const BoundingVolumeHierarchy* surface_ = nullptr;

@@ -71,6 +71,18 @@ class WallFunction {
     return amplitude_ * power_ / reach_ * std::pow(left(std::abs(a)), power_ - 1);
   }
 
+  struct ShareAndSlope {
+    double share;  ///< [-]
+    double slope;  ///< [1/m]
+  };
+
+  /// Both at the price of one.
+  ShareAndSlope share_and_slope(double a) const noexcept {
+    const double l = left(std::abs(a));
+    const double steep = amplitude_ * std::pow(l, power_ - 1);
+    return {a < 0 ? 2 * amplitude_ - steep * l : steep * l, power_ / reach_ * steep};
+  }
+
   /// What the sum over directions needs at one distance.
   struct Terms {
     double share;                ///< [-]

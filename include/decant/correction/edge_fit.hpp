@@ -120,7 +120,8 @@ class EdgeFit {
       });
       const double size = moment.norm();
       if (size > 0) {
-        const double h_squared = disc.radius * disc.radius - std::pow(1.5 * size, 2.0 / 3.0);
+        const double root = std::cbrt(1.5 * size);
+        const double h_squared = disc.radius * disc.radius - root * root;
         disc.wanted -= settings_.push * (disc.radius - std::sqrt(std::max(0.0, h_squared))) / size * moment;
       }
     });

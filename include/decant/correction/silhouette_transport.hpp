@@ -227,12 +227,18 @@ class SilhouetteTransport {
     return reach_squared / (reach_squared + blur_ * blur_);
   }
 
+  /// Positive values to a power: to some 1e-13, in a quarter of the time that the last bits take.
+  template <class Values>
+  static auto raised(const Values& values, double power) {
+    return (power * values.log()).exp();
+  }
+
   // A scale per node of each side such that the plan u K v has the nodes' masses, as far as reach allows.
   void find_scales() {
     const double power = stiffness();
     for (int iteration = 0; iteration < settings_.iterations; ++iteration) {
-      from_.scale = (from_.mass / spread_scale(to_, to_.scale, from_)).pow(power);
-      to_.scale = (to_.mass / spread_scale(from_, from_.scale, to_)).pow(power);
+      from_.scale = raised(from_.mass / spread_scale(to_, to_.scale, from_), power);
+      to_.scale = raised(to_.mass / spread_scale(from_, from_.scale, to_), power);
     }
   }
 
@@ -241,12 +247,12 @@ class SilhouetteTransport {
     const double power = stiffness();
     for (int iteration = 0; iteration < settings_.debias_iterations; ++iteration) {
       // the symmetric problem has one scale; half steps in the logarithm converge where full ones swing
-      from_.scale = (from_.scale * (from_.mass / spread_scale(from_, from_.scale, from_)).pow(power)).sqrt();
+      from_.scale = (from_.scale * raised(from_.mass / spread_scale(from_, from_.scale, from_), power)).sqrt();
     }
   }
 
-  /// Adds to the shifts, with a sign, the mean place that each node is matched with by the weights K scale. @param total
-  /// gets the sum of the weights.
+  /// Adds to the shifts, with a sign, the mean place that each node is matched with by the weights K scale. @param
+  /// total gets the sum of the weights.
   void add_matches(const Silhouette& silhouette, double sign, Grid& total) {
     const auto moment = [&](Index axis, Grid& shift) {
       moments_.resize(silhouette.scale.size());
@@ -274,7 +280,7 @@ class SilhouetteTransport {
     add_matches(from_, -1, total_self_);
     add_matches(to_, 1, total_);
     const double full_cell = spacing_ * spacing_;
-    const Grid matched = (std::exp(1.0) * (total_ / full_cell).pow(1 - stiffness())).min(1.0);
+    const Grid matched = (std::exp(1.0) * raised(total_ / full_cell, 1 - stiffness())).min(1.0);
     const auto known = total_ > smallest_total && total_self_ > smallest_total;
     shift_x_ = known.select(matched * shift_x_, 0);
     shift_y_ = known.select(matched * shift_y_, 0);

@@ -44,6 +44,8 @@ class Dfsph {
                                                ///< looser, still water keeps falling through itself by what is allowed
   Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
   int most_iterations = 200;                   ///< of each solve, per sub-step
+  Scalar tolerance_factor = Scalar(1);         ///< of all three tolerances [-], > 0
+  Scalar stability_number = Scalar(0.3);       ///< see largest_stable_step [-], > 0
 
   /// What is carried from step to step, to start the next solve from.
   struct Memory {
@@ -78,7 +80,8 @@ class Dfsph {
       under_pressure += term > 0 ? 1 : 0;
     }
     const double mean = total > 0 ? total / under_pressure * static_cast<double>(step.rest_density) : 0;
-    return largest_stable_step(step, mean, static_cast<double>(density_tolerance));
+    return largest_stable_step(step, mean, static_cast<double>(tolerance_factor * density_tolerance),
+                               static_cast<double>(stability_number));
   }
 
   template <class Step>
@@ -224,8 +227,8 @@ class Dfsph {
   template <class Step>
   ComplementarityReport relax(const Step& step, PressureSystem<Scalar>& system, std::vector<Scalar>& term,
                               Scalar tolerance, Scalar largest) noexcept {
-    complementarity_.mean_tolerance = static_cast<double>(tolerance);
-    complementarity_.largest_tolerance = static_cast<double>(largest);
+    complementarity_.mean_tolerance = static_cast<double>(tolerance_factor * tolerance);
+    complementarity_.largest_tolerance = static_cast<double>(tolerance_factor * largest);
     complementarity_.most_iterations = most_iterations;
     return complementarity_.solve(step, system, offset_, term);
   }

@@ -19,12 +19,12 @@ namespace decant {
 /// deep pool for one, needs steps in which particles move little against each other: at a third of the usual and below,
 /// even what has collapsed stands up again.
 /// @param mean_pressure over rest density, of what is under pressure [m^2/s^2]. @param density_tolerance that the
-/// solver keeps to in the mean [-], infinity for solvers that had better not slow down. @return [s], infinity without
-/// pressure.
+/// solver keeps to in the mean [-], infinity for solvers that had better not slow down. @param stability_number as
+/// above [-]: 0.3 unless liquid is shallow, or corrected soon. @return [s], infinity without pressure.
 template <class Step>
-typename Step::Scalar largest_stable_step(const Step& step, double mean_pressure, double density_tolerance) noexcept {
+typename Step::Scalar largest_stable_step(const Step& step, double mean_pressure, double density_tolerance,
+                                          double stability_number = 0.3) noexcept {
   using Scalar = typename Step::Scalar;
-  constexpr double share = 0.3;
   if (!(mean_pressure > 0)) {
     return std::numeric_limits<Scalar>::infinity();
   }
@@ -34,7 +34,8 @@ typename Step::Scalar largest_stable_step(const Step& step, double mean_pressure
   }
   excess /= static_cast<double>(step.fluid.size());
   const double caution = std::clamp(3 * density_tolerance / excess, 0.15, 1.0);
-  return static_cast<Scalar>(caution * share * static_cast<double>(step.spacing) / std::sqrt(2 * mean_pressure));
+  return static_cast<Scalar>(caution * stability_number * static_cast<double>(step.spacing) /
+                             std::sqrt(2 * mean_pressure));
 }
 
 }  // namespace decant

@@ -70,7 +70,8 @@ class Simulator {
       : settings_(settings), domain_(domain), search_(domain), neighbors_(domain) {
     validate(settings_);
     smoothing_length_ = settings_.spacing * settings_.support_in_spacings / static_cast<double>(Kernel::support_factor);
-    configure_forces();
+    configure(solver_);
+    std::apply([this](auto&... terms) { (this->configure(terms), ...); }, forces_);
   }
 
   // ---- the scene --------------------------------------------------------------------------------------------------
@@ -399,27 +400,30 @@ class Simulator {
         return (wants_correction<Terms> || ...);
       }(std::type_identity<Forces>{});
 
-  /// Parts that know gravity, viscosity or surface tension by these names take them from the settings.
-  void configure_forces() {
-    std::apply([this](auto&... terms) { (this->configure(terms), ...); }, forces_);
-  }
-  template <class Force>
-  void configure(Force& term) {
-    if constexpr (requires { term.acceleration = settings_.gravity.template cast<Scalar>(); }) {
-      term.acceleration = settings_.gravity.template cast<Scalar>();
+  /// Parts that know gravity, viscosity, surface tension or limits by these names take them from the settings.
+  template <class Part>
+  void configure(Part& part) {
+    if constexpr (requires { part.acceleration = settings_.gravity.template cast<Scalar>(); }) {
+      part.acceleration = settings_.gravity.template cast<Scalar>();
     }
-    if constexpr (requires { term.kinematic_viscosity = Scalar(0); }) {
-      term.kinematic_viscosity = static_cast<Scalar>(settings_.liquid.kinematic_viscosity());
+    if constexpr (requires { part.kinematic_viscosity = Scalar(0); }) {
+      part.kinematic_viscosity = static_cast<Scalar>(settings_.liquid.kinematic_viscosity());
     }
-    if constexpr (requires { term.numerical_viscosity = Scalar(0); }) {
-      term.numerical_viscosity = static_cast<Scalar>(settings_.numerical_viscosity * settings_.spacing *
+    if constexpr (requires { part.numerical_viscosity = Scalar(0); }) {
+      part.numerical_viscosity = static_cast<Scalar>(settings_.numerical_viscosity * settings_.spacing *
                                                      std::sqrt(settings_.gravity.norm() * settings_.spacing));
-      if constexpr (requires { term.pressure_share = Scalar(0); }) {
-        term.pressure_share = static_cast<Scalar>(settings_.numerical_viscosity / 3);
+      if constexpr (requires { part.pressure_share = Scalar(0); }) {
+        part.pressure_share = static_cast<Scalar>(settings_.numerical_viscosity / 3);
       }
     }
-    if constexpr (requires { term.surface_tension = Scalar(0); }) {
-      term.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
+    if constexpr (requires { part.tolerance_factor = Scalar(1); }) {
+      part.tolerance_factor = static_cast<Scalar>(settings_.tolerance_factor);
+    }
+    if constexpr (requires { part.stability_number = Scalar(1); }) {
+      part.stability_number = static_cast<Scalar>(settings_.stability_number);
+    }
+    if constexpr (requires { part.surface_tension = Scalar(0); }) {
+      part.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
     }
   }
 
