@@ -46,6 +46,11 @@ TEST_CASE("wall function and its slope and weight belong together") {
     CHECK(wall.slope(a * d) ==
           Approx((wall.share(a * d - step) - wall.share(a * d + step)) / (2 * step)).epsilon(1e-5));
   }
+  for (const double a : {-1.5, -0.7, -1e-3, 0.0, 0.3, 0.9, 0.9999, 1.0, 1.5}) {
+    const auto both = wall.share_and_slope(a * d);
+    CHECK(both.share == Approx(wall.share(a * d)).epsilon(1e-13));
+    CHECK(both.slope == Approx(wall.slope(a * d)).epsilon(1e-13));
+  }
   for (const double a : {0.0, 1e-3, 0.3, 0.9, 0.9999, 1.0, 1.5}) {
     const auto terms = wall.terms(a * d);
     CHECK(terms.share == Approx(wall.share(a * d)).epsilon(1e-13));

@@ -228,15 +228,53 @@ TEST_CASE("simulator: parts take their settings from the simulator") {
   settings.gravity = {1, 2, 3};
   settings.liquid = liquids::olive_oil;
   settings.numerical_viscosity = 0;
+  settings.tolerance_factor = 3;
+  settings.stability_number = 0.25;
   Simulator<CapillaryParts<double>> simulator(settings);
   CHECK(simulator.force<Gravity<double>>().acceleration == Vector3<double>(1, 2, 3));
   CHECK(simulator.force<Viscosity<double>>().kinematic_viscosity == Approx(0.084 / 911));
   CHECK(simulator.force<SurfaceTension<double>>().surface_tension == Approx(0.032));
+  CHECK(simulator.pressure_solver().tolerance_factor == 3);
+  CHECK(simulator.pressure_solver().stability_number == 0.25);
   settings.numerical_viscosity = 0.02;
   Simulator<CapillaryParts<double>> calmed(settings);
   CHECK(calmed.force<Viscosity<double>>().kinematic_viscosity == Approx(0.084 / 911));
   CHECK(calmed.force<ResidualViscosity<double>>().numerical_viscosity ==
         Approx(0.02 * 0.005 * std::sqrt(std::sqrt(14.0) * 0.005)));
+}
+
+TEST_CASE("simulator: settings for tracking take half the sub-steps, and liquid stays where it belongs") {
+  struct Outcome {
+    int sub_steps = 0, iterations = 0;
+    double density_error = 0, height = 0, speed = 0;
+  };
+  // a column of liquid at one end of a box, or a layer all over it
+  const auto run = [](const SimulatorSettings& settings, int long_by, int high_by) {
+    LiquidSimulator simulator(settings);
+    simulator.add_body("box", BoxInside{{0, 0, 0}, {0.16, 0.048, 0.16}, 0.002, {}});
+    const auto x = block<float>(long_by, 6, high_by, 0.008);
+    simulator.add_particles(x, PointArray<float>::Zero(3, x.cols()), 0);
+    Outcome outcome;
+    for (int k = 0; k < 60; ++k) {
+      const StepReport report = simulator.step(1.0 / 60);
+      REQUIRE(report.advanced());
+      outcome.sub_steps += report.sub_steps;
+      outcome.iterations += report.density_iterations + report.divergence_iterations;
+      outcome.density_error = std::max(outcome.density_error, report.density_error);
+    }
+    outcome.height = static_cast<double>(simulator.fluid().position.row(2).mean());
+    outcome.speed = std::sqrt(static_cast<double>(simulator.fluid().velocity.colwise().squaredNorm().mean()));
+    return outcome;
+  };
+  const SimulatorSettings usual = with_spacing(0.008), quick = for_tracking(usual);
+  const Outcome fell = run(usual, 8, 14), fell_quickly = run(quick, 8, 14);
+  CHECK(fell_quickly.sub_steps < 0.65 * fell.sub_steps);
+  CHECK(fell_quickly.iterations < 0.6 * fell.iterations);  // though longer sub-steps need more each
+  CHECK(fell_quickly.density_error <= 0.0101);
+  CHECK(fell_quickly.height == Approx(fell.height).margin(0.5 * 0.008));
+  const Outcome rested = run(quick, 20, 12);
+  CHECK(rested.height == Approx(6 * 0.008).margin(0.1 * 0.008));
+  CHECK(rested.speed < 0.03);  // a tenth of sqrt(g d)
 }
 
 TEST_CASE("simulator: a periodic channel keeps its liquid and its mass") {
