@@ -23,8 +23,8 @@ struct SilhouetteTransportSettings {
   double blur_px = 4;          ///< square root of the entropy's weight, > 0: what is finer is not told apart
   double reach_px = 40;        ///< moving mass farther costs more than to leave it unmatched, > blur_px
   int most_nodes = 20000;      ///< of the grid around both silhouettes; cells grow where there would be more, >= 100
-  int iterations = 50;         ///< of the matching, >= 1
-  int debias_iterations = 25;  ///< of the matching of the prediction with itself, >= 1
+  int iterations = 25;         ///< of the matching, >= 1; as many again change no score
+  int debias_iterations = 12;  ///< of the matching of the prediction with itself, >= 1
 };
 
 /// Unbalanced, debiased optimal transport between two masks: the sum of squared distances that pixels travel is the
