@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 // A tracker in a robot's callbacks. Poses of a cup arrive at 100 Hz and masks of a camera at 30 Hz, each with its own
-// stamp. Some masks never come, one comes after its successor, one twice, one is cropped, and a clock is reset: each
+// stamp. Some masks never come, one comes after its successor, one twice, one is cropped, and a clock is set: each
 // is answered by a status, nothing throws, and the liquid stays in step with a fan in the room that it knows nothing
 // of.
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <map>
 #include <string>
@@ -36,8 +37,6 @@ class LiquidWatcher {
 
   /// When no mask has come for some time: the robot's poses alone keep the liquid where it is.
   FrameReport on_silence(double now) { return track(now, {}); }
-
-  const LiquidSimulator& liquid() const { return tracker_.model(); }
 
  private:
   FrameReport track(double stamp, const std::vector<CameraMask>& masks) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A recording, tracked from beginning to end: frames per second of wall time for each corrector, what a frame's parts
-// take, and how long the worst frame took. Masks are read beforehand. Usage:
+// take, and how long the worst frame took. Model and tracker are those of `track`; masks are read beforehand. Usage:
 // bench_loop_tracker RECORDING [spacing in mm = 3] [threads = 2] [most frames]
 
 #include <algorithm>
@@ -16,6 +16,7 @@
 #include <decant/io/recording_reader.hpp>
 
 #include "common.hpp"
+#include "support/tracking_run.hpp"
 
 namespace {
 
@@ -27,34 +28,11 @@ struct Film {
   std::vector<std::optional<Mask>> masks;
 };
 
-LiquidSimulator model_of(const Recording& recording, double spacing, int threads) {
-  SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.gravity = recording.gravity;
-  settings.liquid = {recording.liquid.density, recording.liquid.viscosity, recording.liquid.surface_tension};
-  settings.threads = {threads};
-  LiquidSimulator model(for_tracking(settings));
-  for (const recording::Body& body : recording.bodies) {
-    model.add_body(body.name, body.mesh, PoseTrack(body.motion.at(recording.timestamps.front())));
-  }
-  const auto& initial = recording.liquid.initial.value();
-  fill(model, static_cast<BodyId>(initial.body),
-       initial.fill_fraction ? FillAmount::fraction(*initial.fill_fraction) : FillAmount::volume(*initial.volume));
-  return model;
-}
-
 template <class CorrectorType>
-void measure(const char* name, const Film& film, const LiquidSimulator& model, int threads) {
+void measure(const char* name, const Film& film, const example::TrackingModel& model,
+             const example::TrackingOptions& options) {
   const Recording& recording = film.recording;
-  TrackerSettings settings;
-  settings.gravity = recording.gravity;
-  settings.threads = {threads};
-  Tracker<LiquidSimulator, CorrectorType> tracker(model, CorrectorType(), settings);
-  const recording::View& view = recording.cameras.front().view(0);
-  const auto& d = view.distortion;
-  tracker.add_camera({PinholeCamera(view.fx, view.fy, view.cx, view.cy, recording.width, recording.height),
-                      {d[0], d[1], d[2], d[3], d[4]}},
-                     view.camera_from_world);
+  auto tracker = example::tracker_for(recording, model, CorrectorType(), options);
   const double start = recording.timestamps.front() - model.time();
   std::vector<TrackedPose> poses(recording.bodies.size());
   std::vector<double> frame_ms;
@@ -98,7 +76,7 @@ void measure(const char* name, const Film& film, const LiquidSimulator& model, i
   std::sort(frame_ms.begin(), frame_ms.end());
   const double sub_steps = std::max(steps.sub_steps, 1);
   std::printf("%s,%d,%ld,%zu,%.1f,%.1f,%.1f,%.1f,%.1f,%.2f,%.2f,%.2f,%.1f,%.2f,%.1f,%.1f,%.3f,%s,%s,%s\n", name,
-              threads, static_cast<long>(tracker.model().fluid().size()), frame_ms.size(), 1e3 * frames / sum,
+              options.threads, static_cast<long>(tracker.model().fluid().size()), frame_ms.size(), 1e3 * frames / sum,
               frame_ms[frame_ms.size() / 2], frame_ms[frame_ms.size() * 9 / 10], frame_ms.back(),
               total.physics_ms / frames, total.drawing_ms / frames, total.correction_ms / frames,
               total.relaxation_ms / frames, sub_steps / frames, total.physics_ms / sub_steps,
@@ -115,24 +93,26 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "bench_loop_tracker RECORDING [spacing in mm = 3] [threads = 2] [most frames]\n");
     return 2;
   }
-  const double spacing = count > 2 ? 1e-3 * std::atof(arguments[2]) : 0.003;
-  const int threads = count > 3 ? std::atoi(arguments[3]) : 2;
+  example::TrackingOptions options;
+  options.spacing = count > 2 ? 1e-3 * std::atof(arguments[2]) : 0.003;
+  options.threads = count > 3 ? std::atoi(arguments[3]) : 2;
   const auto most = static_cast<std::size_t>(count > 4 ? std::max(1, std::atoi(arguments[4])) : 1000000);
   try {
     Film film{read_recording(arguments[1]), {}};
+    expects(!film.recording.cameras.empty(), "bench_loop_tracker: cameras of the recording", "one or more", 0);
     for (std::size_t frame = 0; frame < std::min(film.recording.frames, most); ++frame) {
       film.masks.push_back(film.recording.liquid_mask(frame, 0));
     }
-    const LiquidSimulator model = model_of(film.recording, spacing, threads);
+    const auto model = example::model_of<example::TrackingParts>(film.recording, options);
     std::printf(
         "corrector,threads,particles,frames,frames_per_second,median_ms,ninth_decile_ms,worst_ms,physics_ms,"
         "drawing_ms,correction_ms,relaxation_ms,sub_steps,ms_per_sub_step,density_iterations,divergence_iterations,"
         "iou_mean,compiler,flags,cpu\n");
-    measure<OpenLoop<>>("open_loop", film, model, threads);
-    measure<SilhouetteCorrector<>>("default", film, model, threads);
-    measure<MapFilter<>>("map_filter_mended", film, model, threads);
-    measure<MapFilterSchenck2017<>>("map_filter", film, model, threads);
-    measure<WarpFieldSchenck2017<>>("warp_field", film, model, threads);
+    measure<OpenLoop<>>("open_loop", film, model, options);
+    measure<SilhouetteCorrector<>>("default", film, model, options);
+    measure<MapFilter<>>("map_filter_mended", film, model, options);
+    measure<MapFilterSchenck2017<>>("map_filter", film, model, options);
+    measure<WarpFieldSchenck2017<>>("warp_field", film, model, options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 2;

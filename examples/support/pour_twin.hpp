@@ -296,7 +296,8 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
     StateEquation<float>& solver = reality.pressure_solver();
     solver.set_sound_speed(14, static_cast<float>(settings.liquid.density));  // six times as fast as the jet
-    solver.artificial_viscosity = 1;                                          // until it has calmed down
+    // until it has calmed down
+    solver.artificial_viscosity = 1;
   }
   using Filling = std::conditional_t<foreign, SettledParts, Parts>;
   Simulator<Filling> filling(settings);
@@ -308,7 +309,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   if constexpr (foreign) {  // what one solver takes for settled is not at rest for another
     const StepReport calmed = reality.step(calming);
     if (!calmed.advanced() || calmed.contents[0].volume < 0.99 * filled.volume) {
-      throw std::runtime_error("the reality does not calm down: liquid leaves the container before it is moved");
+      throw std::runtime_error("the reality does not calm down, or leaves its container before that is moved");
     }
   }
   if constexpr (std::is_same_v<Parts, RealityParts<StateEquation<float>>>) {
@@ -413,14 +414,15 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
 inline void record_pour(
     const PourTwin& twin, const std::filesystem::path& folder,
     const std::function<void(double)>& progress = [](double) {}) {
-  decant::expects(twin.fill_fraction > 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in (0, 1]",
-                  twin.fill_fraction);
-  const HiddenPhysics hidden = draw_hidden_physics(twin);
   using namespace decant;
+  expects(twin.fill_fraction > 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in (0, 1]",
+          twin.fill_fraction);
+  const HiddenPhysics hidden = draw_hidden_physics(twin);
+  // position-based liquid as deep as in a bottle throws itself out of it
+  const bool position_based = twin.seed % 2 == 1 && twin.container == "cup";
   if (!twin.hidden_physics) {
     detail::record_pour<DefaultParts<>>(twin, hidden, "divergence-free", folder, progress);
-  } else if (twin.seed % 2 == 1 &&
-             twin.container == "cup") {  // in a bottle liquid is too deep: it would throw itself out
+  } else if (position_based) {
     detail::record_pour<RealityParts<PositionBased<float>>>(twin, hidden, "position-based", folder, progress);
   } else {
     detail::record_pour<RealityParts<StateEquation<float>>>(twin, hidden, "state equation", folder, progress);
