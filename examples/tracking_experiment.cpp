@@ -107,6 +107,7 @@ std::vector<example::TrackingJob> jobs_of(const std::string& set, const Plan& pl
       }
     }
     if (set == "pours") {
+      jobs.push_back({each, example::true_effects});
       jobs.push_back({each, example::perfect_state});
     }
   }

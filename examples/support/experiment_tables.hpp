@@ -162,9 +162,9 @@ inline std::vector<ExperimentSection> pour_tables(const TrackingExperiment& expe
   };
   const std::vector<Subject> subjects{
       {"Assimilated", detail::mean_percent("/iou_mean"), 1, true, true,
-       of_twelve + " Against the recorded masks, cleaned, after the correction. perfect_state is the true silhouette "
-                   "in the tracker's place: what the masks' noise alone takes away. The paper's figures are of its own "
-                   "recordings."},
+       of_twelve + " Against the recorded masks, cleaned, after the correction. true_effects is open loop by a model "
+                   "that was told what physics it lacks; perfect_state is the true silhouette in the tracker's place: "
+                   "what the masks' noise alone takes away. The paper's figures are of its own recordings."},
       {"Assimilated, pooled over pixels", detail::pooled_percent("pixels"), 1, true, true,
        "All intersections over all unions [%]."},
       {"Prior", detail::mean_percent("/prior_iou"), 1, true, true,
@@ -208,6 +208,7 @@ inline std::vector<ExperimentSection> pour_tables(const TrackingExperiment& expe
     }
     ExperimentSection section{subject.title, decant::Table(std::move(header)), {}, subject.note};
     std::vector<std::string> rows = methods;
+    rows.push_back(true_effects);
     if (subject.of_perfect_state) {
       rows.push_back(perfect_state);
     }

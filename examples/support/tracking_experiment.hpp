@@ -293,7 +293,7 @@ inline const Condition& amount_condition() {
 /// One method on one recording under one condition.
 struct TrackingJob {
   Pour pour;
-  std::string method;  ///< or perfect_state
+  std::string method;  ///< or perfect_state, true_effects
   const Condition* condition = nullptr;
   double value = 0;
 
@@ -308,6 +308,10 @@ struct TrackingJob {
 /// The name of a method that is none: a state whose silhouette is the true one. Its score is what the masks' noise
 /// alone takes away.
 inline const std::string perfect_state = "perfect_state";
+
+/// Another one: open loop, by a model that has been told the physics that it lacks, and how late poses are. What
+/// knowing the cause gives, without looking at a single mask; solver, spacing and noisy poses are the model's own.
+inline const std::string true_effects = "true_effects";
 
 struct ExperimentOptions {
   std::filesystem::path folder;                      ///< of the recordings, with results/ in it
@@ -527,6 +531,25 @@ class TrackingExperiment {
     return *shared->model;
   }
 
+  /// For true_effects: the model, and the recording without what its poses are late by.
+  static TrackingModel model_told(const nlohmann::json& truth, decant::Recording& recording, TrackingOptions& options) {
+    for (decant::Index axis = 0; axis < 3; ++axis) {
+      recording.gravity[axis] += truth.at("pull_m_s2").at(static_cast<std::size_t>(axis)).get<double>();
+    }
+    recording.liquid.viscosity = recording.liquid.density * truth.at("kinematic_viscosity_m2_s").get<double>();
+    for (decant::recording::Body& body : recording.bodies) {
+      std::vector<decant::PoseTrack::Sample> samples = body.motion.samples();
+      for (auto& sample : samples) {
+        sample.time -= truth.at("latency_s").get<double>();
+      }
+      body.motion = decant::PoseTrack(std::move(samples));
+    }
+    options.source_slip = truth.at("sticky_walls").get<bool>() ? decant::Slip::None : decant::Slip::Free;
+    TrackingModel model = model_of<TrackingParts>(recording, options);
+    model.force<decant::LinearDrag<float>>().rate = truth.at("drag_1_s").get<float>();
+    return model;
+  }
+
   nlohmann::json compute(const TrackingJob& job, const std::function<void(double)>& progress) {
     const std::filesystem::path folder = options_.folder / job.pour.name, truth_masks = folder / "truth_mask";
     const nlohmann::json truth = truth_of(folder);
@@ -543,8 +566,10 @@ class TrackingExperiment {
     if (job.altered()) {
       job.condition->apply(job.value, job.pour.twin.seed, recording, options);
     }
-    const TrackingModel model = filled_model(job, recording, options);
-    const TrackingResult result = tracking_method(job.method)(recording, model, options, truth_masks, progressed);
+    const bool told = job.method == true_effects;
+    const TrackingModel model = told ? model_told(truth, recording, options) : filled_model(job, recording, options);
+    const TrackingResult result =
+        tracking_method(told ? "open_loop" : job.method)(recording, model, options, truth_masks, progressed);
     progress(1);  // also where a method stopped early
     nlohmann::json json = tracking_json(result, recording, options.forecasts);
     json["pixels"] = pixels_json(result.posterior);

@@ -39,8 +39,9 @@ struct TrackingOptions {
   std::vector<double> forecasts{};  ///< how far ahead [s]
   int frames_between_forecasts = 10;
   int threads = 0;
-  bool keep_overlays = false;        ///< for reports; takes some MB of memory per hundred frames
-  double initial_amount_factor = 1;  ///< the model starts with so much of what the recording says, >= 0
+  bool keep_overlays = false;                     ///< for reports; takes some MB of memory per hundred frames
+  double initial_amount_factor = 1;               ///< the model starts with so much of what the recording says, >= 0
+  decant::Slip source_slip = decant::Slip::Free;  ///< how liquid goes along what it is poured from
   /// What the tracker gets to see of a frame and camera instead of the recording's masks, which forecasts are scored
   /// against in any case.
   std::function<std::optional<decant::Mask>(const decant::Recording&, std::size_t frame, std::size_t camera)> masks{};
@@ -143,7 +144,9 @@ decant::Simulator<Parts> model_of(const decant::Recording& recording, const Trac
   settings.threads = {options.threads};
   Simulator<Parts> model(for_tracking(settings));
   for (const recording::Body& body : recording.bodies) {
-    const BodyId id = model.add_body(body.name, body.mesh, PoseTrack(body.motion.at(recording.timestamps.front())));
+    const Slip slip = body.role == recording::Role::Source ? options.source_slip : Slip::Free;
+    const BodyId id =
+        model.add_body(body.name, body.mesh, PoseTrack(body.motion.at(recording.timestamps.front())), slip);
     if (body.role == recording::Role::Source || body.role == recording::Role::Target) {
       model.watch_contents(id);
     }
