@@ -45,6 +45,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/edge_fit.hpp>

@@ -63,7 +63,7 @@ class PositionBased {
   /// that followed it would get ever shorter and turn a per cent of compression into metres per second.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
-    return largest_stable_step(step, memory_.calm_pressure, std::numeric_limits<double>::infinity());
+    return largest_stable_step(step, memory_.calm_pressure, std::numeric_limits<double>::infinity(), 0.3);
   }
 
   template <class Step>

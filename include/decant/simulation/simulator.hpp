@@ -21,6 +21,7 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/kernel/concept.hpp>
@@ -286,7 +287,8 @@ class Simulator {
     bodies_.sample(before_, settings_.spacing, settings_.threads, walls_);
     Index cut_short = keep_on_sides();  // this takes the speed into walls
     if (sweeps > 0 && fluid_.size() > 0) {
-      find_neighbors();
+      StepTimes not_of_a_step;
+      find_neighbors(not_of_a_step);
       kept_velocity_ = fluid_.velocity;
       fluid_.velocity.setZero();
       apart_.most_iterations = sweeps;
@@ -505,32 +507,40 @@ class Simulator {
 
   /// @return whether the pressure solver converged.
   bool sub_step(double time_step, StepReport& report) noexcept {
+    StepTimes& times = report.times;
     bodies_.set_interval(time_, time_step);
     pour_in(time_step);
-    find_neighbors();
-    compute_densities();
-
+    find_neighbors(times);
     const Step step = view(time_step);
-    if constexpr (corrects_gradients) {
-      correction_.compute(step);
-    }
+    timed(times.sums_ms, [&] {
+      compute_densities();
+      if constexpr (corrects_gradients) {
+        correction_.compute(step);
+      }
+    });
     PressureReport pressure;
     shift_.set_count(fluid_.size());
     shift_.setZero();
-    solver_.begin_step(step, pressure);
-    apply_forces<false>(step);
-    solver_.solve(step, pressure);
-    apply_forces<true>(step);
+    timed(times.pressure_ms, [&] { solver_.begin_step(step, pressure); });
+    timed(times.forces_ms, [&] { apply_forces<false>(step); });
+    timed(times.pressure_ms, [&] { solver_.solve(step, pressure); });
+    timed(times.forces_ms, [&] { apply_forces<true>(step); });
     if constexpr (requires { solver_.correct_places(step, pressure); }) {
-      solver_.correct_places(step, pressure);
+      timed(times.pressure_ms, [&] { solver_.correct_places(step, pressure); });
     }
-    advance(time_step, report);
+    timed(times.moving_ms, [&] { advance(time_step, report); });
 
     report.density_iterations += pressure.density_iterations;
     report.divergence_iterations += pressure.divergence_iterations;
     report.density_error = std::max(report.density_error, pressure.density_error);
     report.divergence_error = std::max(report.divergence_error, pressure.divergence_error);
     return pressure.converged;
+  }
+
+  template <class Work>
+  static void timed(double& total_ms, Work&& work) noexcept {
+    const Stopwatch watch(total_ms);
+    work();
   }
 
   template <bool after_pressure>
@@ -555,7 +565,15 @@ class Simulator {
     }
   }
 
-  void find_neighbors() noexcept {
+  void find_neighbors(StepTimes& times) noexcept {
+    timed(times.sorting_ms, [&] { sort_into_lists(); });
+    timed(times.walls_ms, [&] {
+      bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
+      shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
+    });
+  }
+
+  void sort_into_lists() noexcept {
     const double support = settings_.spacing * settings_.support_in_spacings;
     const Scalar reach = static_cast<Scalar>(support * (1 + static_cast<double>(Solver::search_margin)));
     search_.rebuild(fluid_.position, reach, settings_.threads);
@@ -565,8 +583,6 @@ class Simulator {
       search_.adopt_order(settings_.threads);
     }
     neighbors_.build_from(search_, fluid_.position, settings_.threads);
-    bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
-    shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
   }
 
   void compute_densities() noexcept {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,6 +20,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
@@ -260,20 +260,6 @@ class Tracker {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
-  class Stopwatch {
-   public:
-    explicit Stopwatch(double& total_ms) noexcept : total_ms_(total_ms), start_(Clock::now()) {}
-    ~Stopwatch() { total_ms_ += std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
-    Stopwatch(const Stopwatch&) = delete;
-    Stopwatch& operator=(const Stopwatch&) = delete;
-
-   private:
-    double& total_ms_;
-    Clock::time_point start_;
-  };
-
   /// A camera with all that belongs to its picture.
   struct Eye {
     RayOcclusion<Camera> occlusion;
