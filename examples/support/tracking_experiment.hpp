@@ -27,6 +27,7 @@
 
 #include <decant/core/image.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
+#include <decant/force/linear_drag.hpp>
 #include <decant/io/detail/folder.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/png.hpp>

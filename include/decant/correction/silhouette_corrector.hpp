@@ -25,9 +25,9 @@ class SilhouetteCorrector {
   SilhouetteCorrector() = default;
 
   /// @param edge_passes how often the edge is fitted in a frame, >= 0: on pours of twins, three passes took away a
-  /// quarter of what silhouettes lacked; a fourth gains half a point more. Throws std::invalid_argument.
+  /// quarter of what silhouettes lacked; the fourth gains another third of a point. Throws std::invalid_argument.
   SilhouetteCorrector(TransportCorrector<Scalar, CameraType> transport, MassRelocation<Scalar, CameraType> relocation,
-                      EdgeFit<Scalar, CameraType> edge = EdgeFit<Scalar, CameraType>(), int edge_passes = 3)
+                      EdgeFit<Scalar, CameraType> edge = EdgeFit<Scalar, CameraType>(), int edge_passes = 4)
       : transport_(std::move(transport)),
         relocation_(std::move(relocation)),
         edge_(std::move(edge)),
@@ -59,7 +59,7 @@ class SilhouetteCorrector {
   TransportCorrector<Scalar, CameraType> transport_{};
   MassRelocation<Scalar, CameraType> relocation_{};
   EdgeFit<Scalar, CameraType> edge_{};
-  int edge_passes_ = 3;
+  int edge_passes_ = 4;
 };
 static_assert(Corrector<SilhouetteCorrector<>>);
 
