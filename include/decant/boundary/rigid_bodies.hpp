@@ -55,6 +55,7 @@ class RigidBodies {
     Pose before{}, after{};               ///< at the ends of the current step
     RigidVelocity velocity{};             ///< between them
     double reach = 0;                     ///< the farthest that any point of the body moves between them [m]
+    double fastest = 0;                   ///< the speed of its bounds' fastest corner [m/s]
     Eigen::Isometry3d from_world_before =
         Eigen::Isometry3d::Identity();  ///< inverse of `before`, ready for many points
     Eigen::Isometry3d from_world_after = Eigen::Isometry3d::Identity();
@@ -105,11 +106,12 @@ class RigidBodies {
       }
       body.from_world_before = isometry(body.before.inverse());
       body.from_world_after = isometry(body.after.inverse());
-      body.reach = 0;
-      // a rigid displacement is affine in the place, so its largest size over a box is at a corner
+      body.reach = body.fastest = 0;
+      // rigid displacements and velocities are affine in the place, so they are largest at a corner of the box
       for (int corner = 0; corner < 8; ++corner) {
         const Vector3<double> x = body.bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
         body.reach = std::max(body.reach, (body.after * x - body.before * x).norm());
+        body.fastest = std::max(body.fastest, body.velocity.at(body.before * x).norm());
       }
     }
   }
@@ -121,14 +123,21 @@ class RigidBodies {
   double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads,
                                 Reduction<double>& reduction) const noexcept {
     const bool all_move = !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), moves);
+    double fastest = 0;
+    for (const Body& body : bodies_) {
+      fastest = std::max(fastest, body.fastest);
+    }
     return reduction.over(
         fluid.size(), threads, 0.0,
         [&](Index begin, Index end) {
           double largest = 0;
           const auto take = [&largest](double speed) { largest = speed <= largest ? largest : speed; };  // NaN stays
           for (Index i = begin; i < end; ++i) {
-            const Vector3<double> x = fluid.position.col(i).template cast<double>();
             const Vector3<double> v = fluid.velocity.col(i).template cast<double>();
+            if (v.norm() + fastest <= largest) {
+              continue;  // whatever it is near
+            }
+            const Vector3<double> x = fluid.position.col(i).template cast<double>();
             if (v.squaredNorm() > largest * largest && has_left(x, v)) {
               continue;
             }
@@ -269,8 +278,8 @@ class RigidBodies {
       share.body = static_cast<BodyId>(b);
       share.amount = sample.share;
       share.distance = sample.distance;
-      share.gradient = body.before.rotation * sample.gradient;
-      const Eigen::Matrix3d turn = body.before.rotation.toRotationMatrix();
+      const Eigen::Matrix3d turn = body.from_world_before.linear().transpose();
+      share.gradient = turn * sample.gradient;
       share.moment = turn * sample.moment * turn.transpose();
       const double steepness = share.gradient.norm();
       if (steepness > 0) {
@@ -287,12 +296,25 @@ class RigidBodies {
       }
       near[place_in_row] = share;
     }
-    combine(i, near, count, reach, spacing, walls);
+    if (count == 0) {
+      leave_free(i, walls);
+    } else {
+      combine(i, near, count, spacing, walls);
+    }
+  }
+
+  /// No wall is felt.
+  void leave_free(Index i, WallState<Scalar>& walls) const noexcept {
+    walls.share[i] = walls.flux[i] = 0;
+    walls.gradient.col(i).setZero();
+    walls.moment.col(i).setZero();
+    walls.distance[i] = static_cast<Scalar>(reach_);
+    walls.contact_count[i] = 0;
   }
 
   /// Bodies together: shares add up, but what is hidden behind a nearer body does not count.
-  void combine(Index i, std::array<Share, WallState<Scalar>::max_contacts>& near, std::size_t count, double reach,
-               double spacing, WallState<Scalar>& walls) const noexcept {
+  void combine(Index i, std::array<Share, WallState<Scalar>::max_contacts>& near, std::size_t count, double spacing,
+               WallState<Scalar>& walls) const noexcept {
     double amount = 0, flux = 0;
     Vector3<double> gradient = Vector3<double>::Zero();
     Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
@@ -331,7 +353,7 @@ class RigidBodies {
       }
     }
     walls.flux[i] = static_cast<Scalar>(flux);
-    walls.distance[i] = static_cast<Scalar>(count > 0 ? near[0].distance : reach);
+    walls.distance[i] = static_cast<Scalar>(near[0].distance);
     walls.contact_count[i] = static_cast<std::uint8_t>(count);
   }
 

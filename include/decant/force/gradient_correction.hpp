@@ -77,13 +77,28 @@ class GradientCorrection {
     return squared > 0 ? Vector3<Scalar>(g.dot(apply(i, g)) / squared * g) : g;
   }
 
+  /// L_i times the gradient in each lane, rounded as by the function below: what two particles do to each other stays
+  /// equal to the last bit.
+  [[gnu::always_inline]] Batch3<Scalar> apply(Index i, const Batch3<Scalar>& g) const noexcept {
+    using B = Batch<Scalar>;
+    const Scalar* a = &first_[4 * static_cast<std::size_t>(i)];
+    const Scalar* b = &second_[4 * static_cast<std::size_t>(i)];
+    return product({B(a[0]), B(a[1]), B(a[2])}, {B(b[0]), B(b[1]), B(b[2])}, g);
+  }
+
   /// L_j times a gradient for each lane's j.
   [[gnu::always_inline]] Batch3<Scalar> apply(const std::uint32_t* index, const Batch3<Scalar>& g) const noexcept {
-    const Batch3<Scalar> a = gather3(first_.data(), index), b = gather3(second_.data(), index);
-    return {a.x * g.x + a.y * g.y + a.z * g.z, a.y * g.x + b.x * g.y + b.y * g.z, a.z * g.x + b.y * g.y + b.z * g.z};
+    return product(gather3(first_.data(), index), gather3(second_.data(), index), g);
   }
 
  private:
+  [[gnu::always_inline]] static Batch3<Scalar> product(const Batch3<Scalar>& a, const Batch3<Scalar>& b,
+                                                       const Batch3<Scalar>& g) noexcept {
+    return {multiply_add(a.z, g.z, multiply_add(a.y, g.y, a.x * g.x)),
+            multiply_add(b.y, g.z, multiply_add(b.x, g.y, a.y * g.x)),
+            multiply_add(b.z, g.z, multiply_add(b.y, g.y, a.z * g.x))};
+  }
+
   /// A symmetric matrix.
   struct Symmetric {
     Scalar xx, xy, xz, yy, yz, zz;

@@ -302,10 +302,11 @@ class NeighborList {
     for (auto* values : {&x_, &y_, &z_}) {
       values->require(room);
     }
-    const Index grain = static_cast<Index>((chunks() + workers - 1) / workers);
-    parallel_ranges(static_cast<Index>(chunks()), threads, std::max<Index>(1, grain), [&](Index begin, Index end) {
-      Workspace& workspace = workspaces_[static_cast<std::size_t>(begin / grain)];
-      for (std::size_t c = static_cast<std::size_t>(begin); c < static_cast<std::size_t>(end); ++c) {
+    const std::size_t share = (chunks() + workers - 1) / workers;
+    parallel_ranges(static_cast<Index>(workers), threads, 1, [&](Index worker, Index) {
+      Workspace& workspace = workspaces_[static_cast<std::size_t>(worker)];
+      const std::size_t first = static_cast<std::size_t>(worker) * share;
+      for (std::size_t c = first; c < std::min(chunks(), first + share); ++c) {
         Chunk chunk{rows_at(0), rows_.data(), (c + 1) * chunk_room_, c * chunk_room_};
         write_chunk(search, c * chunk_size, std::min(count_, (c + 1) * chunk_size), workspace, chunk);
         needed_[c] = chunk.next - c * chunk_room_;

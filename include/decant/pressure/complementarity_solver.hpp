@@ -237,7 +237,7 @@ class ComplementaritySolver {
             const auto own = static_cast<std::size_t>(i);
             term[own] += along * direction_[own];
             residual_[own] -= along * image_[own];
-            for (std::size_t axis = 0; axis < 4; ++axis) {
+            for (std::size_t axis = 0; axis < 3; ++axis) {
               sum_[4 * own + axis] += along * system.accelerations()[4 * own + axis];
             }
             const Scalar left = residual_[own], slope = squared_step * system.diagonal()[own];
@@ -259,7 +259,7 @@ class ComplementaritySolver {
   double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0
-  std::vector<Scalar> sum_{};      ///< accelerations by `term`, records of four
+  std::vector<Scalar> sum_{};      ///< accelerations by `term`, records as the system's
   Reduction<Progress> reduction_{};
   Reduction<double> reduction_of_sums_{};
 };

@@ -220,7 +220,7 @@ class Dfsph {
       record[0] = step.fluid.velocity(0, i);
       record[1] = step.fluid.velocity(1, i);
       record[2] = step.fluid.velocity(2, i);
-      record[3] = 0;
+      record[3] = place_system_.weights()[i];
     });
   }
 
