@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/pressure_system.hpp>
@@ -87,31 +89,33 @@ class CoarseCells {
   template <class Step>
   void assemble(const Step& step, const PressureSystem<Scalar>& system, const std::vector<Scalar>& contact) {
     felt_.resize(cell_.size());
+    part_of_.resize(cell_.size());
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
-      Felt& felt = felt_[static_cast<std::size_t>(i)];
-      felt = Felt{};
-      system.for_each_response(step.neighbors, i, [&](std::size_t j, Scalar x, Scalar y, Scalar z) {
-        const Index slot = slot_[j];
-        felt.cell[static_cast<std::size_t>(slot)] = cell_[j];
-        felt.part(slot, 0) += contact[j] * x;
-        felt.part(slot, 1) += contact[j] * y;
-        felt.part(slot, 2) += contact[j] * z;
-      });
+      const auto own = static_cast<std::size_t>(i);
+      part_of_[own] = static_cast<Scalar>(contact[own] > 0 ? slot_[own] : slots);
     });
+    parallel_for(step.fluid.size(), step.threads,
+                 [&](Index i) { feel(step.neighbors, system, i, felt_[static_cast<std::size_t>(i)]); });
     find_groups();
     lay_out_profile();
-    const double squared_step = static_cast<double>(step.time_step) * static_cast<double>(step.time_step);
-    std::size_t i = 0;
-    for (const Group& group : groups_) {
-      Products gathered = Products::Zero();
-      for (; i < group.end; ++i) {
-        gathered.noalias() += felt_[i].part.lazyProduct(felt_[i].part.transpose());
+    const auto squared_step = static_cast<Scalar>(step.time_step * step.time_step);
+    products_.resize(groups_.size());
+    const Index groups_per_range = 64;
+    parallel_ranges(static_cast<Index>(groups_.size()), step.threads, groups_per_range, [&](Index begin, Index end) {
+      for (auto g = static_cast<std::size_t>(begin); g < static_cast<std::size_t>(end); ++g) {
+        Products gathered = Products::Zero();
+        for (std::size_t i = g == 0 ? 0 : groups_[g - 1].end; i < groups_[g].end; ++i) {
+          gathered.noalias() += felt_[i].part.lazyProduct(felt_[i].part.transpose());
+        }
+        products_[g] = squared_step * gathered;
       }
+    });
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const auto& cell = groups_[g].cell;
       for (std::size_t k = 0; k < slots; ++k) {
-        for (std::size_t l = 0; l < slots && group.cell[k] != none; ++l) {
-          if (group.cell[l] <= group.cell[k]) {
-            entry(group.cell[k], group.cell[l]) +=
-                squared_step * static_cast<double>(gathered(static_cast<Index>(k), static_cast<Index>(l)));
+        for (std::size_t l = 0; l < slots && cell[k] != none; ++l) {
+          if (cell[l] <= cell[k]) {
+            entry(cell[k], cell[l]) += static_cast<double>(products_[g](static_cast<Index>(k), static_cast<Index>(l)));
           }
         }
       }
@@ -157,6 +161,41 @@ class CoarseCells {
     std::array<std::uint32_t, slots> cell{none, none, none, none, none, none, none, none};
     Parts part = Parts::Zero();
   };
+
+  template <class Neighbors>
+  void feel(const Neighbors& list, const PressureSystem<Scalar>& system, Index i, Felt& felt) const noexcept {
+    using B = Batch<Scalar>;
+    const auto own = static_cast<std::size_t>(i);
+    felt = Felt{};
+    std::array<Batch3<Scalar>, slots> sums;
+    system.for_each_response(list, i, [&](const std::uint32_t* neighbor, B x, B y, B z) {
+      const B part = gather(part_of_.data(), neighbor);
+      for (std::size_t slot = 0; slot < slots; ++slot) {
+        const auto in_slot = part == B(static_cast<Scalar>(slot));
+        const std::uint32_t lanes = in_slot.bits();
+        if (lanes == 0) {
+          continue;
+        }
+        const B zero(Scalar(0));
+        if (felt.cell[slot] == none) {
+          felt.cell[slot] = cell_[neighbor[std::countr_zero(lanes)]];
+          sums[slot] = {zero, zero, zero};
+        }
+        sums[slot].x += select(in_slot, x, zero);
+        sums[slot].y += select(in_slot, y, zero);
+        sums[slot].z += select(in_slot, z, zero);
+      }
+    });
+    for (std::size_t slot = 0; slot < slots; ++slot) {
+      if (felt.cell[slot] != none) {
+        felt.part.row(static_cast<Index>(slot)) << sum(sums[slot].x), sum(sums[slot].y), sum(sums[slot].z);
+      }
+    }
+    if (const std::size_t slot = slot_[own]; part_of_[own] < static_cast<Scalar>(slots)) {
+      felt.cell[slot] = cell_[own];
+      felt.part.row(static_cast<Index>(slot)) += Eigen::Map<const Eigen::Matrix<Scalar, 1, 3>>(system.own_response(i));
+    }
+  }
 
   /// Particles that follow each other in the list and feel the same cells, or no others: what they add to the matrix is
   /// gathered before it goes there.
@@ -272,7 +311,9 @@ class CoarseCells {
   std::vector<std::uint32_t> cell_{};                         ///< of each particle
   std::vector<std::uint8_t> slot_{};                          ///< of its cell, see Felt
   std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};  ///< the particles of each cell
+  std::vector<Scalar> part_of_{};                             ///< slot_ of particles in contact, else `slots`
   std::vector<Felt> felt_{};
+  std::vector<Products, Eigen::aligned_allocator<Products>> products_{};  ///< of each group
   std::vector<Group> groups_{};
   std::vector<std::uint32_t> first_{};
   std::vector<std::size_t> row_{};  ///< where column 0 of each row would be

@@ -129,22 +129,20 @@ class PressureSystem {
     });
   }
 
-  /// Calls f(j, x, y, z) with minus the acceleration of particle i by a unit of P_j, for its neighbours and itself.
+  /// Minus the accelerations of particle i by a unit of P_j: calls f(neighbor, x, y, z) for each batch of neighbours j,
+  /// whose numbers are at `neighbor`. Rows are filled up with i itself and zeros.
   template <class Neighbors, class Function>
-  void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
+  [[gnu::always_inline]] void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
     const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
-    const auto own = static_cast<std::size_t>(i);
-    const std::size_t first = list.first(i), count = static_cast<std::size_t>(list.count(i));
-    for (std::size_t k = 0; k < count; k += width) {
-      const Batch3<Scalar> gradient = load(push + 3 * (first + k));
-      for (std::size_t lane = 0; lane < std::min(width, count - k); ++lane) {
-        const auto j = static_cast<std::size_t>(list.index()[first + k + lane]);
-        const auto at = static_cast<int>(lane);
-        f(j, weight_[j] * gradient.x[at], weight_[j] * gradient.y[at], weight_[j] * gradient.z[at]);
-      }
+    for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
+      const std::uint32_t* const neighbor = list.index() + at;
+      const B weight = gather(weight_.data(), neighbor);
+      const Batch3<Scalar> gradient = load(push + 3 * at);
+      f(neighbor, weight * gradient.x, weight * gradient.y, weight * gradient.z);
     }
-    f(own, total_[4 * own], total_[4 * own + 1], total_[4 * own + 2]);
   }
+  /// The same by a unit of its own P.
+  const Scalar* own_response(Index i) const noexcept { return &total_[4 * static_cast<std::size_t>(i)]; }
 
   /// D_i of one particle for vectors in records of four, the last one weights(): velocities, or accelerations (then
   /// walls do not move).
