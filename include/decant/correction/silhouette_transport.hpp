@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/types.hpp>
+#include <decant/coverage/detail/liquid_box.hpp>
 
 namespace decant {
 
@@ -60,14 +61,17 @@ class SilhouetteTransport {
   /// Matches two masks of one size. @return false if either is empty: displacement() is then zero everywhere.
   bool match(ConstMaskView predicted, ConstMaskView observed) {
     nodes_x_ = nodes_y_ = 0;
-    Box box;
-    if (predicted.rows() != observed.rows() || predicted.cols() != observed.cols() || !box.include(predicted) ||
-        !box.include(observed)) {
+    if (predicted.rows() != observed.rows() || predicted.cols() != observed.cols()) {
       return false;
     }
+    const PixelBox of_predicted = detail::liquid_box(predicted), of_observed = detail::liquid_box(observed);
+    if (of_predicted.empty() || of_observed.empty()) {
+      return false;
+    }
+    const PixelBox box = of_predicted.hull(of_observed);
     lay_grid(box);
-    spread(predicted, box, from_);
-    spread(observed, box, to_);
+    spread(predicted, of_predicted, from_);
+    spread(observed, of_observed, to_);
     find_scales();
     find_debiasing_scales();
     find_displacements();
@@ -100,35 +104,14 @@ class SilhouetteTransport {
  private:
   using Grid = Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// The pixels that liquid lies in.
-  struct Box {
-    Index top = std::numeric_limits<Index>::max(), bottom = -1, left = top, right = -1;
-
-    bool include(const ConstMaskView& mask) noexcept {
-      bool any = false;
-      for (Index row = 0; row < mask.rows(); ++row) {
-        for (Index column = 0; column < mask.cols(); ++column) {
-          if (is_liquid(mask(row, column))) {
-            any = true;
-            top = std::min(top, row);
-            bottom = std::max(bottom, row);
-            left = std::min(left, column);
-            right = std::max(right, column);
-          }
-        }
-      }
-      return any;
-    }
-  };
-
   /// A silhouette on the grid.
   struct Silhouette {
     std::vector<Index> nodes{};      ///< that have mass
     Eigen::ArrayXd mass{}, scale{};  ///< of these [px^2]; scale: v of the matching, or u0 of the prediction with itself
   };
 
-  void lay_grid(const Box& box) {
-    const auto width = static_cast<double>(box.right - box.left), height = static_cast<double>(box.bottom - box.top);
+  void lay_grid(const PixelBox& box) {
+    const auto width = static_cast<double>(box.width() - 1), height = static_cast<double>(box.height() - 1);
     for (spacing_ = settings_.cell_px;; spacing_ *= 1.25) {
       nodes_x_ = static_cast<Index>(width / spacing_) + 2 + 2 * margin_nodes;
       nodes_y_ = static_cast<Index>(height / spacing_) + 2 + 2 * margin_nodes;
@@ -136,8 +119,8 @@ class SilhouetteTransport {
         break;
       }
     }
-    origin_ = {static_cast<double>(box.left) - margin_nodes * spacing_,
-               static_cast<double>(box.top) - margin_nodes * spacing_};
+    origin_ = {static_cast<double>(box.u_begin) - margin_nodes * spacing_,
+               static_cast<double>(box.v_begin) - margin_nodes * spacing_};
     // the blur grows with the nodes' distance: a kernel narrower than that would not see its neighbors
     blur_ = settings_.blur_px * spacing_ / settings_.cell_px;
     const auto radius = static_cast<Index>(std::sqrt(-std::log(kernel_floor)) * blur_ / spacing_);
@@ -151,13 +134,13 @@ class SilhouetteTransport {
   }
 
   /// Each pixel's mass goes to the four nodes around it, by its distance to them: the centroid stays where it is.
-  void spread(const ConstMaskView& mask, const Box& box, Silhouette& silhouette) {
+  void spread(const ConstMaskView& mask, const PixelBox& box, Silhouette& silhouette) {
     values_.setZero();
-    for (Index row = box.top; row <= box.bottom; ++row) {
+    for (Index row = box.v_begin; row < box.v_end; ++row) {
       const double y = (static_cast<double>(row) - origin_.y()) / spacing_;
       const auto top = static_cast<Index>(y);
       const double lower_share = y - static_cast<double>(top);
-      for (Index column = box.left; column <= box.right; ++column) {
+      for (Index column = box.u_begin; column < box.u_end; ++column) {
         if (is_liquid(mask(row, column))) {
           const double x = (static_cast<double>(column) - origin_.x()) / spacing_;
           const auto left = static_cast<Index>(x);
