@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -154,6 +155,17 @@ class RigidBodies {
               WallState<Scalar>& walls) const noexcept {
     walls.resize(position.cols());
     parallel_for(position.cols(), threads, [&](Index i) { sample_particle(i, position.col(i), spacing, walls); });
+  }
+
+  /// As sample, for the particles with again[i] != 0 only: what `walls` has of the others is right.
+  /// @param again N entries.
+  void sample_again(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> again, double spacing,
+                    Threads threads, WallState<Scalar>& walls) const noexcept {
+    parallel_for(position.cols(), threads, [&](Index i) {
+      if (again[static_cast<std::size_t>(i)] != 0) {
+        sample_particle(i, position.col(i), spacing, walls);
+      }
+    });
   }
 
   /// True if some wall stands between two points of the world at the start of the interval.
