@@ -279,7 +279,11 @@ class Simulator {
     if (!taken_.empty()) {
       kept_velocity_ = fluid_.velocity;
       for (BodyId body = 0; body < bodies_.size(); ++body) {
-        bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+        if constexpr (requires { bodies_.push_out(body, 1.0, fluid_, settings_.threads); }) {
+          bodies_.push_out(body, 0.5 * settings_.spacing, fluid_, settings_.threads);
+        } else {
+          bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+        }
       }
       fluid_.velocity = kept_velocity_;
       for (const std::uint32_t i : taken_) {
