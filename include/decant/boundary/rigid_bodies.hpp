@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -165,6 +166,17 @@ class RigidBodies {
     parallel_for(position.cols(), threads, [&](Index i) { sample_particle(i, position.col(i), spacing, walls); });
   }
 
+  /// As sample, for the particles with again[i] != 0 only: what `walls` has of the others is right.
+  /// @param again N entries.
+  void sample_again(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> again, double spacing,
+                    Threads threads, WallState<Scalar>& walls) const noexcept {
+    parallel_for(position.cols(), threads, [&](Index i) {
+      if (again[static_cast<std::size_t>(i)] != 0) {
+        sample_particle(i, position.col(i), spacing, walls);
+      }
+    });
+  }
+
   /// True if some wall stands between two points of the world at the start of the interval.
   bool separated(const Vector3<Scalar>& a, const Vector3<Scalar>& b, const WallContact<Scalar>* contacts,
                  int contact_count) const noexcept {
@@ -180,23 +192,23 @@ class RigidBodies {
 
   /// Moves particles that are inside of a body's material to the nearest place outside of it, `clearance` [m] off its
   /// surface, and to rest relative to it. For a body that is put where liquid is. @return how many were moved.
-  Index push_out(BodyId body_id, double clearance, FluidState<Scalar>& fluid) const {
+  Index push_out(BodyId body_id, double clearance, FluidState<Scalar>& fluid, Threads threads = {1}) const {
     const Body& body = bodies_[body_id];
     const Pose body_from_world = body.before.inverse();
-    Index moved = 0;
-    for (Index i = 0; i < fluid.size(); ++i) {
+    std::atomic<Index> moved{0};
+    parallel_for(fluid.size(), threads, [&](Index i) {
       const Vector3<double> x = body_from_world * fluid.position.col(i).template cast<double>();
       if (!body.bounds.contains(x) || !body.surface->inside_material(x)) {
-        continue;
+        return;
       }
       if (const auto near = body.surface->closest_point(x, body.bounds.diagonal().norm())) {
         const Vector3<double> out =
             near->distance > 1e-12 ? Vector3<double>((near->point - x) / near->distance) : near->normal;
         fluid.position.col(i) = (body.before * (near->point + clearance * out)).template cast<Scalar>();
         fluid.velocity.col(i).setZero();
-        ++moved;
+        moved.fetch_add(1, std::memory_order_relaxed);
       }
-    }
+    });
     return moved;
   }
 

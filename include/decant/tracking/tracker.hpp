@@ -343,7 +343,7 @@ class Tracker {
     const auto& position = const_cast<Model&>(model).fluid().position;
     eye.occlusion.follow(model.bodies(), model.time());
     eye.hidden.resize(static_cast<std::size_t>(position.count()));
-    find_hidden(eye.occlusion, position, settings_.threads, eye.hidden);
+    eye.occlusion.find_hidden(position, settings_.threads, eye.hidden);
     const PosedCamera<Camera>& camera = eye.occlusion.camera();
     const double gap_px = settings_.gap_closing_in_spacings * model.spacing() * pixels_per_metre(camera, position);
     eye.silhouette.closing().set_gap_px(static_cast<int>(std::lround(std::min<double>(gap_px, GapClosing::widest_px))));
