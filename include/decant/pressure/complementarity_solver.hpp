@@ -41,8 +41,14 @@ class ComplementaritySolver {
   double net_tolerance = 3e-4;
   int most_iterations = 100;  ///< >= 1
 
+  /// Forgets all that earlier frames have left: what a frame comes to depends on its state alone.
+  void begin_frame() noexcept { cells_.forget(); }
+
   /// Forgets the places of particles; call once per sub-step, before the first solve.
-  void begin_step() noexcept { sorted_ = assembled_ = false; }
+  void begin_step() noexcept {
+    sorted_ = false;
+    ++age_;
+  }
 
   /// @param offset N, [kg/m^3]. @param term N, P: start and result. Leaves the matching accelerations in the system.
   /// What is amiss at a particle: compression that is left, or pressure that pushes liquid apart (as far as it does).
@@ -88,9 +94,9 @@ class ComplementaritySolver {
         return report;
       }
       const bool in_bulk = net_ > net_allowed;
-      if (in_bulk && !assembled_) {
+      if (in_bulk && (age_ >= sub_steps_per_matrix || !cells_.assembled())) {
         cells_.assemble(step, system, contact_);
-        assembled_ = true;
+        age_ = 0;
       }
       Scope scope = in_bulk ? Scope::Both : Scope::Particles;
       double product = precondition(step, system, squared_step, scope);
@@ -137,6 +143,7 @@ class ComplementaritySolver {
 
  private:
   static constexpr int steps_between_starts = 6;
+  static constexpr int sub_steps_per_matrix = 4;  ///< of CoarseCells: it costs as much as three iterations
 
   /// Whose residuals a direction answers to.
   enum class Scope { Particles, Cells, Both };
@@ -176,7 +183,7 @@ class ComplementaritySolver {
   double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step,
                       Scope scope) noexcept {
     if (scope != Scope::Particles) {
-      cells_.solve();
+      cells_.solve(step.time_step);
     }
     return sum_over(step, [&](std::size_t own) {
       const Scalar slope = squared_step * system.diagonal()[own];
@@ -269,7 +276,8 @@ class ComplementaritySolver {
 
   Scalar smallest_slope_ = 0;
   CoarseCells<Scalar> cells_{};
-  bool sorted_ = false, assembled_ = false;
+  bool sorted_ = false;
+  int age_ = 0;     ///< of the cells' matrix, in sub-steps
   double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0

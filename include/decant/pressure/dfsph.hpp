@@ -84,6 +84,8 @@ class Dfsph {
                                static_cast<double>(stability_number));
   }
 
+  void begin_frame() noexcept { complementarity_.begin_frame(); }
+
   template <class Step>
   void begin_step(const Step& step, PressureReport&) noexcept {
     resize(step.fluid.size());
