@@ -67,6 +67,7 @@
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
 #include <decant/force/linear_drag.hpp>
+#include <decant/force/pair_kernel.hpp>
 #include <decant/force/residual_viscosity.hpp>
 #include <decant/force/step_view.hpp>
 #include <decant/force/surface_tension.hpp>

@@ -33,18 +33,15 @@ class GradientCorrection {
   /// For the particles, neighbours and walls of a sub-step; step is a StepView.
   template <class Step>
   void compute(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     first_.resize(4 * static_cast<std::size_t>(count));
     second_.resize(4 * static_cast<std::size_t>(count));
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(count, step.threads, [&](Index i) {
       const B zero(Scalar(0));
       B xx = zero, xy = zero, xz = zero, yy = zero, yz = zero, zz = zero;
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope = gather(mass, pair.neighbor) *
-                        Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const B slope = step.mass(pair.neighbor) * step.pairs.slope(pair.slot);
         const B x = slope * pair.x, y = slope * pair.y, z = slope * pair.z;
         xx = multiply_add(x, pair.x, xx);
         xy = multiply_add(x, pair.y, xy);

@@ -102,7 +102,6 @@ struct ResidualViscosity {
   /// One pass: adds what it does to the velocities, and puts these as they are afterwards into next_.
   template <class Step>
   void brake(const Step& step, PointArray<Scalar>& acceleration) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(0.01) * h * h;
@@ -123,7 +122,7 @@ struct ResidualViscosity {
         const B residual = (velocity[0] - other.x - half * along_x) * pair.x +
                            (velocity[1] - other.y - half * along_y) * pair.y +
                            (velocity[2] - other.z - half * along_z) * pair.z;
-        const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B slope = step.pairs.slope(pair.slot);
         const B nu = velocity[3] + other.w;
         const B push = nu * other_stretch.w * residual * slope / (pair.distance_squared + softening);
         x = multiply_add(push, pair.x, x);
@@ -142,7 +141,6 @@ struct ResidualViscosity {
   /// Walls take part as liquid that moves with them along their normal.
   template <class Step>
   void compute_gradients(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     stretch_.resize(4 * static_cast<std::size_t>(count));
@@ -153,8 +151,7 @@ struct ResidualViscosity {
       const B zero(Scalar(0));
       std::array<Batch3<Scalar>, 3> rows{{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}}};
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope = gather(mass, pair.neighbor) *
-                        Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const B slope = step.mass(pair.neighbor) * step.pairs.slope(pair.slot);
         const auto other = gather3(velocity_.data(), pair.neighbor);
         const std::array<B, 3> apart{other.x - velocity_[own], other.y - velocity_[own + 1],
                                      other.z - velocity_[own + 2]};

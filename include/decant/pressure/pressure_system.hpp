@@ -35,7 +35,6 @@ class PressureSystem {
   /// Takes the sub-step's geometry: pairs, walls, masses.
   template <class Step>
   void assemble(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     corrected_ = false;
     resize(step);
     const auto& list = step.neighbors;
@@ -44,11 +43,10 @@ class PressureSystem {
       Sums sums;
       const B own_weight(weight_[static_cast<std::size_t>(i)]);
       list.for_each_batch(i, [&](const auto& pair) {
-        const B slope =
-            unit * Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const B slope = unit * step.pairs.slope(pair.slot);
         CompactScalar* const place = &rate_[3 * pair.slot];
         store({slope * pair.x, slope * pair.y, slope * pair.z}, place);
-        sums.add(load(place), gather(weight_.data(), pair.neighbor), own_weight);
+        sums.add(load(place), weights(pair.neighbor), own_weight);
       });
       Scalar flux = 0;
       Vector3<Scalar> wall = Vector3<Scalar>::Zero();
@@ -75,7 +73,7 @@ class PressureSystem {
         const Batch3<Scalar> gradient = load(&plain.rate_[3 * at]);
         store(step.correction.apply(i, gradient), &rate_[3 * at]);
         store(step.correction.apply(list.index() + at, gradient), &push_[3 * at]);
-        sums.add(load(&rate_[3 * at]), gather(weight_.data(), list.index() + at), own_weight);
+        sums.add(load(&rate_[3 * at]), weights(list.index() + at), own_weight);
       }
       Scalar flux = 0;
       Vector3<Scalar> wall = Vector3<Scalar>::Zero();
@@ -106,15 +104,20 @@ class PressureSystem {
   template <class Neighbors>
   void accelerate(const Neighbors& list, const Scalar* pressure_term, Threads threads) noexcept {
     const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
-    parallel_for(count_, threads, [&](Index i) {
-      const auto own = static_cast<std::size_t>(i);
-      weighted_[own] = weight_[own] * pressure_term[own];
-    });
+    const Scalar* weighted = pressure_term;
+    if (common_weight_ == 0) {
+      weighted = weighted_.data();
+      parallel_for(count_, threads, [&](Index i) {
+        const auto own = static_cast<std::size_t>(i);
+        weighted_[own] = weight_[own] * pressure_term[own];
+      });
+    }
+    const Scalar factor = common_weight_ == 0 ? Scalar(1) : common_weight_;
     parallel_for(count_, threads, [&](Index i) {
       const auto own = static_cast<std::size_t>(i);
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
-        const B term = gather(weighted_.data(), list.index() + at);
+        const B term = gather(weighted, list.index() + at);
         const Batch3<Scalar> gradient = load(push + 3 * at);
         x = multiply_add(term, gradient.x, x);
         y = multiply_add(term, gradient.y, y);
@@ -122,9 +125,9 @@ class PressureSystem {
       }
       const Scalar* total = &total_[4 * own];
       Scalar* record = &records_[4 * own];
-      record[0] = -(sum(x) + pressure_term[own] * total[0]);
-      record[1] = -(sum(y) + pressure_term[own] * total[1]);
-      record[2] = -(sum(z) + pressure_term[own] * total[2]);
+      record[0] = -(factor * sum(x) + pressure_term[own] * total[0]);
+      record[1] = -(factor * sum(y) + pressure_term[own] * total[1]);
+      record[2] = -(factor * sum(z) + pressure_term[own] * total[2]);
       record[3] = weight_[own];
     });
   }
@@ -136,7 +139,7 @@ class PressureSystem {
     const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
     for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
       const std::uint32_t* const neighbor = list.index() + at;
-      const B weight = gather(weight_.data(), neighbor);
+      const B weight = weights(neighbor);
       const Batch3<Scalar> gradient = load(push + 3 * at);
       f(neighbor, weight * gradient.x, weight * gradient.y, weight * gradient.z);
     }
@@ -181,6 +184,10 @@ class PressureSystem {
     }
   };
 
+  [[gnu::always_inline]] B weights(const std::uint32_t* neighbor) const noexcept {
+    return common_weight_ > 0 ? B(common_weight_) : gather(weight_.data(), neighbor);
+  }
+
   [[gnu::always_inline]] static Batch3<Scalar> load(const CompactScalar* from) noexcept {
     return {load_compact<Scalar>(from), load_compact<Scalar>(from + width), load_compact<Scalar>(from + 2 * width)};
   }
@@ -196,6 +203,7 @@ class PressureSystem {
     rest_density_ = step.rest_density;
     const Scalar squared = step.smoothing_length * step.smoothing_length;
     unit_ = squared * squared;
+    common_weight_ = step.pairs.common_mass() / unit_;
     weight_.resize(static_cast<std::size_t>(count_));
     weighted_.resize(static_cast<std::size_t>(count_));
     parallel_for(count_, step.threads,
@@ -218,7 +226,8 @@ class PressureSystem {
 
   Index count_ = 0;
   Scalar rest_density_ = 0;
-  Scalar unit_ = 0;  ///< h^4, which brings gradients to the order of one [m^4]
+  Scalar common_weight_ = 0;  ///< of all particles; 0 where they differ
+  Scalar unit_ = 0;           ///< h^4, which brings gradients to the order of one [m^4]
   bool corrected_ = false;
   std::vector<CompactScalar> rate_{};  ///< h^4 L_i grad W_ij in the order of the list's index: a batch of x, of y, of z
   std::vector<CompactScalar> push_{};  ///< h^4 L_j grad W_ij likewise, where L is not 1

@@ -465,6 +465,7 @@ class Simulator {
   Step view(double time_step) noexcept {
     return {fluid_,
             neighbors_,
+            pairs_,
             walls_,
             correction_,
             shift_,
@@ -528,7 +529,7 @@ class Simulator {
     find_neighbors(times);
     const Step step = view(time_step);
     timed(times.sums_ms, [&] {
-      compute_densities();
+      pairs_.compute(step);
       if constexpr (corrects_gradients) {
         correction_.compute(step);
       }
@@ -598,21 +599,6 @@ class Simulator {
       search_.adopt_order(settings_.threads);
     }
     neighbors_.build_from(search_, fluid_.position, settings_.threads);
-  }
-
-  void compute_densities() noexcept {
-    const Scalar h = static_cast<Scalar>(smoothing_length_);
-    const Scalar rest_density = static_cast<Scalar>(settings_.liquid.density);
-    const Scalar own = Kernel::value(Scalar(0), h);
-    const Scalar* mass = fluid_.mass.data();
-    parallel_for(fluid_.size(), settings_.threads, [&](Index i) {
-      Batch<Scalar> total(Scalar(0));
-      neighbors_.for_each_batch(i, [&](const auto& pair) {
-        const auto share = gather(mass, pair.neighbor) * Kernel::value(square_root(pair.distance_squared), h);
-        total += select(pair.valid, share, Batch<Scalar>(Scalar(0)));
-      });
-      fluid_.density[i] = sum(total) + mass[i] * own + rest_density * walls_.share[i];
-    });
   }
 
   void advance(double time_step, StepReport& report) noexcept {
@@ -791,6 +777,7 @@ class Simulator {
 
   FluidState<Scalar> fluid_{};
   Neighbors neighbors_;
+  PairKernel<Scalar> pairs_{};
   WallState<Scalar> walls_{};
   WallShield<Scalar> shield_{};
   GradientCorrection<Scalar> correction_{};
