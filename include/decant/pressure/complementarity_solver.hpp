@@ -80,6 +80,7 @@ class ComplementaritySolver {
     const Scalar steep = step.time_step * step.rest_density / step.spacing;
     smallest_slope_ = Scalar(1e-6) * steep * steep;
     bool particles_done = false;
+    int steps_by_cells = 0;
     const auto judge = [&](const Progress& progress) {
       report.error = progress.amiss / (rest_density * static_cast<double>(count));
       net_ = cells_.restrict(residual_, contact_, step.threads);
@@ -123,11 +124,13 @@ class ComplementaritySolver {
         if ((now.negative || now.touched) && since_start >= steps_between_starts) {
           break;
         }
-        // When only whole regions are still amiss, one step by cells alone settles them; particles have no say in it,
-        // and what they ask for would take it seven more.
+        // When only whole regions are still amiss, a step by cells alone settles them; particles have no say in it, and
+        // what they ask for would take it seven more. Where it does not, the matrix is not that of these cells.
         const bool was_whole = scope == Scope::Cells;
         if (in_bulk) {
-          scope = particles_done && !was_whole ? Scope::Cells : Scope::Both;
+          const bool whole = particles_done && !was_whole && steps_by_cells < most_steps_by_cells;
+          scope = whole ? Scope::Cells : Scope::Both;
+          steps_by_cells += whole ? 1 : 0;
         }
         const double next_product = precondition(step, system, squared_step, scope);
         const bool goes_on = !was_whole && scope != Scope::Cells;
@@ -143,6 +146,7 @@ class ComplementaritySolver {
 
  private:
   static constexpr int steps_between_starts = 6;
+  static constexpr int most_steps_by_cells = 2;   ///< per solve
   static constexpr int sub_steps_per_matrix = 4;  ///< of CoarseCells: it costs as much as three iterations
 
   /// Whose residuals a direction answers to.

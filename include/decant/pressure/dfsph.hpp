@@ -45,7 +45,7 @@ class Dfsph {
   Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
   int most_iterations = 200;                   ///< of each solve, per sub-step
   Scalar tolerance_factor = Scalar(1);         ///< of what single particles may be amiss by [-], > 0
-  Scalar stability_number = Scalar(0.4);       ///< see largest_stable_step [-], > 0
+  Scalar stability_number = Scalar(0.3);       ///< see largest_stable_step [-], > 0
 
   /// What is carried from step to step, to start the next solve from.
   struct Memory {

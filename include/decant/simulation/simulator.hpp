@@ -190,6 +190,9 @@ class Simulator {
       return report;
     }
     remember();
+    if constexpr (requires { solver_.begin_frame(); }) {
+      solver_.begin_frame();
+    }
     walls_known_ = false;
     const double end = time_ + frame_time;
     bool converged = true;

@@ -21,7 +21,7 @@ struct SimulatorSettings {
   double largest_step = 0.005;           ///< longest sub-step [s], > 0
   double courant_number = 0.4;           ///< how many spacings liquid may move past a body per sub-step,
                                          ///< 0 < .. <= 2
-  double stability_number = 0.4;         ///< the same, in a sub-step, of the speed that pressure stands for: see
+  double stability_number = 0.3;         ///< the same, in a sub-step, of the speed that pressure stands for: see
                                          ///< largest_stable_step; 0 < .. <= 1, deep liquid collapses at 0.5
   double tolerance_factor = 1;           ///< of the pressure solver's tolerances for single particles, 0.01 .. 100
   double fixed_step = 0;                 ///< if > 0, the length of every sub-step [s] (frames need not fit)
@@ -37,6 +37,7 @@ struct SimulatorSettings {
 /// particles are kept within 1 % of the density in the mean in place of 0.1 %, whole regions as before.
 inline SimulatorSettings for_tracking(SimulatorSettings settings) {
   settings.courant_number = 1.6;
+  settings.stability_number = 0.4;
   settings.tolerance_factor = 10;
   return settings;
 }
