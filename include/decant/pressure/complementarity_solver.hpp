@@ -39,6 +39,9 @@ class ComplementaritySolver {
   /// up over its depth and from one sub-step to the next: eighty layers that each give way by 1e-4 fall through
   /// themselves, while particles that are amiss by ten times as much, some too dense and some too loose, do not.
   double net_tolerance = 3e-4;
+  /// How long the matrix of CoarseCells serves, >= 1: it costs as much as three iterations, and the older it is the
+  /// more steps it takes.
+  int sub_steps_per_matrix = 1;
   int most_iterations = 100;  ///< >= 1
 
   /// Forgets all that earlier frames have left: what a frame comes to depends on its state alone.
@@ -146,8 +149,7 @@ class ComplementaritySolver {
 
  private:
   static constexpr int steps_between_starts = 6;
-  static constexpr int most_steps_by_cells = 2;   ///< per solve
-  static constexpr int sub_steps_per_matrix = 4;  ///< of CoarseCells: it costs as much as three iterations
+  static constexpr int most_steps_by_cells = 8;  ///< per solve
 
   /// Whose residuals a direction answers to.
   enum class Scope { Particles, Cells, Both };

@@ -234,6 +234,8 @@ class Dfsph {
     complementarity_.largest_tolerance = static_cast<double>(tolerance_factor * largest);
     // whole regions must not give way the more for it: that adds up over the depth
     complementarity_.net_tolerance = static_cast<double>(net_share * std::min(tolerance_factor, Scalar(1)) * tolerance);
+    // with tight tolerances, liquid at rest simmers by what an old matrix leaves
+    complementarity_.sub_steps_per_matrix = tolerance_factor > 1 ? 4 : 1;
     complementarity_.most_iterations = most_iterations;
     return complementarity_.solve(step, system, offset_, term);
   }
