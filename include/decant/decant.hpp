@@ -12,6 +12,7 @@
 #include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/mesh_wall.hpp>
 #include <decant/boundary/ray_fan.hpp>
+#include <decant/boundary/remembered_walls.hpp>
 #include <decant/boundary/rigid_bodies.hpp>
 #include <decant/boundary/sampled_wall.hpp>
 #include <decant/boundary/shapes.hpp>

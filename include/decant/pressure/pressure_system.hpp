@@ -3,8 +3,6 @@
 
 /// The linear system behind incompressible SPH: what pressures do to velocities, and what velocities do to densities.
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <vector>
 

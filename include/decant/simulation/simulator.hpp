@@ -16,6 +16,7 @@
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/concept.hpp>
 #include <decant/boundary/mesh_report.hpp>
+#include <decant/boundary/remembered_walls.hpp>
 #include <decant/boundary/shielding.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
@@ -193,7 +194,7 @@ class Simulator {
     if constexpr (requires { solver_.begin_frame(); }) {
       solver_.begin_frame();
     }
-    walls_known_ = false;
+    remembered_walls_.forget();
     const double end = time_ + frame_time;
     bool converged = true;
     while (report.status == StepStatus::Ok && time_ < end) {
@@ -293,11 +294,11 @@ class Simulator {
         before_.col(i) = fluid_.position.col(i);  // no path to look after
       }
     }
-    sample_where_moved(before_);
+    remembered_walls_.sample(bodies_, time_, before_, settings_.spacing, settings_.threads, walls_);
     Index cut_short = keep_on_sides();  // this takes the speed into walls
     if (sweeps > 0 && fluid_.size() > 0) {
-      sort_with_walls();
-      sample_where_moved(fluid_.position);
+      sort_into_lists();
+      remembered_walls_.sample(bodies_, time_, fluid_.position, settings_.spacing, settings_.threads, walls_);
       shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
       kept_velocity_ = fluid_.velocity;
       fluid_.velocity.setZero();
@@ -384,7 +385,7 @@ class Simulator {
     fluid_ = snapshot.fluid;
     solver_.memory() = snapshot.memory;
     bodies_ = snapshot.bodies;
-    walls_known_ = false;
+    remembered_walls_.forget();
     time_ = snapshot.time;
     longest_step_ = snapshot.longest_step;
     next_id_ = snapshot.next_id;
@@ -440,12 +441,6 @@ class Simulator {
       part.surface_tension = static_cast<Scalar>(settings_.liquid.surface_tension);
     }
   }
-
-  /// Whether walls can be asked for some particles alone, see RigidBodies::sample_again.
-  static constexpr bool samples_again = requires(const Bodies& bodies, const Growable<Scalar, 3>& position,
-                                                 std::span<const std::uint8_t> again, WallState<Scalar>& walls) {
-    bodies.sample_again(position, again, 1.0, Threads{}, walls);
-  };
 
   void append(const Vector3<Scalar>& position, const Vector3<Scalar>& velocity, Origin origin) {
     const Index i = fluid_.size();
@@ -624,62 +619,6 @@ class Simulator {
     return guard.slid + guard.stopped + guard.lost;
   }
 
-  /// Fills walls_ for particles at `position`. Particles that are where they were when this was asked last, with bodies
-  /// that are where they were, have their walls already.
-  void sample_where_moved(const Growable<Scalar, 3>& position) noexcept {
-    if constexpr (samples_again) {
-      const Index count = position.count();
-      bool known = walls_known_ && sampled_at_.count() == count && sampled_poses_.size() == bodies_.size();
-      sampled_poses_.resize(bodies_.size());
-      for (std::size_t body = 0; body < bodies_.size(); ++body) {
-        const Pose pose = bodies_[static_cast<BodyId>(body)].motion.at(time_);
-        Pose& sampled = sampled_poses_[body];
-        known = known && pose.translation == sampled.translation && pose.rotation.coeffs() == sampled.rotation.coeffs();
-        sampled = pose;
-      }
-      if (known) {
-        sample_again_.resize(static_cast<std::size_t>(count));
-        parallel_for(count, settings_.threads, [&](Index i) {
-          sample_again_[static_cast<std::size_t>(i)] = position.col(i) == sampled_at_.col(i) ? 0 : 1;
-        });
-        bodies_.sample_again(position, sample_again_, settings_.spacing, settings_.threads, walls_);
-      } else {
-        bodies_.sample(position, settings_.spacing, settings_.threads, walls_);
-      }
-      sampled_at_ = position;
-      walls_known_ = true;
-    } else {
-      bodies_.sample(position, settings_.spacing, settings_.threads, walls_);
-    }
-  }
-
-  /// sort_into_lists, after which walls_ and sampled_at_ are in the new order as well.
-  void sort_with_walls() noexcept {
-    if constexpr (samples_again) {
-      const Index count = fluid_.size();
-      place_before_.resize(next_id_);
-      for (Index i = 0; i < count; ++i) {
-        if (fluid_.id[i] < next_id_) {
-          place_before_[fluid_.id[i]] = static_cast<std::uint32_t>(i);
-        }
-      }
-      sort_into_lists();
-      walls_before_.resize(count);
-      std::swap(walls_, walls_before_);
-      scratch_points_.set_count(count);
-      // whoever it was: what it felt is known by the place alone
-      parallel_for(count, settings_.threads, [&](Index i) {
-        const std::uint32_t id = fluid_.id[i];
-        const Index from = id < next_id_ ? std::min<Index>(place_before_[id], count - 1) : 0;
-        walls_.take(i, walls_before_, from);
-        scratch_points_.col(i) = sampled_at_.col(from);
-      });
-      std::swap(scratch_points_, sampled_at_);
-    } else {
-      sort_into_lists();
-    }
-  }
-
   /// Puts the particles into another order: place k gets what was at order[k].
   void reorder(std::span<const std::uint32_t> order) {
     fluid_.each([&](auto& array) {
@@ -696,6 +635,7 @@ class Simulator {
       std::swap(moved, array);
     });
     solver_.memory().reorder(order);
+    remembered_walls_.reorder(order, settings_.threads, walls_);
   }
 
   auto& scratch_of(Growable<Scalar, 3>&) noexcept { return scratch_points_; }
@@ -795,12 +735,7 @@ class Simulator {
   Growable<Scalar, 3> kept_velocity_{};
   PositionBased<Scalar> apart_{};
   std::vector<std::uint32_t> taken_{};  ///< particles that a corrector took from one place to another
-  bool walls_known_ = false;            ///< walls_ are those of sampled_at_ and sampled_poses_
-  Growable<Scalar, 3> sampled_at_{};
-  std::vector<Pose> sampled_poses_{};
-  std::vector<std::uint8_t> sample_again_{};   ///< N, 1 for particles that moved
-  std::vector<std::uint32_t> place_before_{};  ///< by particles' ids
-  WallState<Scalar> walls_before_{};
+  RememberedWalls<Scalar> remembered_walls_{};
   Growable<Scalar, 3> shift_{};
   Growable<Scalar, 3> scratch_points_{};
   Growable<Scalar, 1> scratch_scalars_{};
