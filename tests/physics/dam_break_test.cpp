@@ -182,8 +182,8 @@ TEST_CASE("dam break presses on the far wall as Buchner measured") {
   const auto places = decant_test::block<float>({0, 0, 0}, 64, 4, 32, spacing);
   simulator.add_particles(places, decant::PointArray<float>::Zero(3, places.cols()), 0);
   decant::Gauges<float> gauges(spacing);
-  // When pressure rises above 0.2, and its mean later. At one place and time the pressure of a thin front flickers by as
-  // much as itself; over the width and five frames the rise comes at 2.60 for 24, 32 and 40 rows of particles.
+  // When pressure rises above 0.2, and its mean later. At one place and time the pressure of a thin front flickers by
+  // as much as itself; over the width and five frames the rise comes at 2.60 for 24, 32 and 40 rows of particles.
   double jump = 0, plateau = 0;
   std::vector<double> pressures;
   int count = 0;
