@@ -177,6 +177,9 @@ inline nlohmann::json tracking_json(const TrackingResult& result, const decant::
                           {"low_90", result.initial_ml->low},
                           {"high_90", result.initial_ml->high},
                           {"at_end", result.initial_ml->at_end}};
+    for (const auto& [ml, log_posterior] : result.initial_ml_hypotheses) {
+      json["initial_ml"]["hypotheses"].push_back({{"ml", ml}, {"log_posterior", number_json(log_posterior)}});
+    }
   }
   json["particles"] = result.particles;
   json["status"] = result.status;

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -71,6 +72,8 @@ struct TrackingResult {
   std::vector<Overlay> overlays;  ///< per frame, where the options ask for them and there is a camera
   std::vector<std::pair<std::string, double>> parameters;  ///< of the model, where a method adapts them
   std::optional<decant::ValueEstimate> initial_ml;         ///< where a method estimates it
+  /// Then also what it asked about: amounts [ml], the smallest first, with their log posteriors [nat].
+  std::vector<std::pair<double, double>> initial_ml_hypotheses;
   std::size_t frames = 0;
   decant::Index particles = 0;
   std::string status = "ok";
@@ -211,6 +214,32 @@ std::vector<double> initial_ml_of(Follower& follower) {
   }
 }
 
+/// Liquid in each watched container now [m^3], by body; expected, where there are several hypotheses.
+template <class Model, class CorrectorType>
+std::map<decant::BodyId, double> contents_of(decant::Tracker<Model, CorrectorType>& tracker) {
+  std::map<decant::BodyId, double> volume;
+  for (const auto& contained : tracker.model().step(0).contents) {
+    volume[contained.body] = contained.volume;
+  }
+  return volume;
+}
+template <class TrackerType>
+std::map<decant::BodyId, double> contents_of(decant::FixedLagTracker<TrackerType>& follower) {
+  return contents_of(follower.tracker());
+}
+template <class TrackerType>
+std::map<decant::BodyId, double> contents_of(decant::HypothesisFilter<TrackerType>& follower) {
+  std::map<decant::BodyId, double> expected;
+  for (std::size_t k = 0; k < follower.size(); ++k) {
+    if (!follower.given_up(k)) {
+      for (const auto& [body, volume] : contents_of(follower.tracker(k))) {
+        expected[body] += follower.probability(k) * volume;
+      }
+    }
+  }
+  return expected;
+}
+
 template <class TrackerType>
 void say_estimates(const TrackerType&, const std::vector<double>&, TrackingResult&) {}
 template <class TrackerType>
@@ -225,7 +254,7 @@ void say_estimates(const decant::FixedLagTracker<TrackerType>& follower, const s
 template <class TrackerType>
 void say_estimates(const decant::HypothesisFilter<TrackerType>& follower, const std::vector<double>& initial_ml,
                    TrackingResult& result) {
-  std::vector<std::pair<double, double>> by_amount;
+  auto& by_amount = result.initial_ml_hypotheses;
   for (std::size_t k = 0; k < follower.size(); ++k) {
     by_amount.emplace_back(initial_ml[k], follower.log_posterior(k));
   }
@@ -360,8 +389,8 @@ TrackingResult track_recording(
     if (frame % static_cast<std::size_t>(options.frames_between_forecasts) == 0) {
       add_forecasts(recording, frame, start, options, follower, result);
     }
-    for (const auto& contained : tracker.model().step(0).contents) {
-      result.volume_ml[contained.body].push_back(1e6 * contained.volume);
+    for (const auto& [body, volume] : contents_of(follower)) {
+      result.volume_ml[body].push_back(1e6 * volume);
     }
     progress(frame + 1);
   }

@@ -12,6 +12,7 @@
 #include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/mesh_wall.hpp>
 #include <decant/boundary/ray_fan.hpp>
+#include <decant/boundary/remembered_walls.hpp>
 #include <decant/boundary/rigid_bodies.hpp>
 #include <decant/boundary/sampled_wall.hpp>
 #include <decant/boundary/shapes.hpp>
@@ -45,6 +46,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/edge_fit.hpp>
@@ -66,6 +68,7 @@
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>
 #include <decant/force/linear_drag.hpp>
+#include <decant/force/pair_kernel.hpp>
 #include <decant/force/residual_viscosity.hpp>
 #include <decant/force/step_view.hpp>
 #include <decant/force/surface_tension.hpp>

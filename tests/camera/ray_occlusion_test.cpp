@@ -280,6 +280,84 @@ TEST_CASE("Points in float are asked in batches too") {
   }
 }
 
+namespace {
+
+// Points that shake, bodies and a camera that move: what is remembered of earlier frames may not change an answer.
+template <class Camera>
+void compare_memory(const Camera& camera, double margin, const std::vector<Pose>& cameras_from_world) {
+  auto occlusion = scene_before(camera, margin);
+  std::mt19937 random(21);
+  decant::PointArray<double> points(3, 3000);
+  for (decant::Index i = 0; i < points.cols(); ++i) {
+    points.col(i) = random_point(random, Point::Zero(), 0.4);
+  }
+  std::vector<std::uint8_t> hidden(3000, 9);
+  int hidden_points = 0, free_points = 0, wrong = 0;
+  for (std::size_t frame = 0; frame < 3 * cameras_from_world.size(); ++frame) {
+    if (frame % 3 == 0) {
+      occlusion.set_camera_pose(cameras_from_world[frame / 3]);
+    } else if (frame % 3 == 1) {
+      occlusion.set_pose(1, pose_of(0.3 * static_cast<double>(frame), Point(0, 1, -1), Point(-0.1, 0.1, -0.15)));
+    }
+    for (int pass = 0; pass < 3; ++pass) {
+      for (decant::Index i = 0; i < points.cols(); ++i) {
+        points.col(i) += random_point(random, Point::Zero(), 0.003);
+      }
+      occlusion.find_hidden(points, decant::Threads{1 << pass}, hidden);
+      for (decant::Index i = 0; i < points.cols(); ++i) {
+        const bool expected = occlusion.hidden(points.col(i));
+        (expected ? hidden_points : free_points) += 1;
+        wrong += hidden[static_cast<std::size_t>(i)] == (expected ? 1 : 0) ? 0 : 1;
+      }
+    }
+  }
+  CHECK(wrong == 0);
+  CHECK(hidden_points > 2000);
+  CHECK(free_points > 2000);
+}
+
+}  // namespace
+
+TEST_CASE("What rays remember of earlier frames changes no answer") {
+  const Pose far = decant_test::camera_from_world();
+  // among the bodies: some are behind the camera, some reach through its plane
+  const Pose near = pose_of(0.1, Point(0, 1, 0), Point(0, 0, 0.12)),
+             within = pose_of(2, Point(0, 1, 0), Point(0, 0, 0));
+  const std::vector<Pose> poses{far, pose_of(0.5, Point(1, -1, 0.3), Point(0.1, 0, 0.7)), near, within, far};
+  for (const double margin : {0.0, 1e-3, 0.02}) {
+    compare_memory(decant_test::pinhole, margin, poses);
+    compare_memory(decant_test::lens, margin, poses);
+    compare_memory(decant_test::orthographic, margin, {far, near});
+    compare_memory(decant_test::registered(decant_test::pinhole), margin, {far, near});
+  }
+  // a plate that is cut by the camera's plane right beside its eye, at a slant: its first piece is in most directions
+  RayOcclusion<PinholeCamera> plate{PosedCamera<PinholeCamera>(decant_test::pinhole), 1e-3};
+  plate.add(decant::Box{Point(-0.1, -0.1, 0), Point(0.1, 0.1, 1e-3)}, pose_of(0.8, Point(1, 0, 0), Point(0, 0.001, 0)));
+  std::mt19937 random(5);
+  decant::PointArray<double> before_eye(3, 2000);
+  std::vector<std::uint8_t> by_plate(2000);
+  for (decant::Index i = 0; i < before_eye.cols(); ++i) {
+    before_eye.col(i) = random_point(random, Point(0, 0, 0.06), 0.05);
+  }
+  plate.find_hidden(before_eye, {}, by_plate);
+  int behind_plate = 0;
+  for (decant::Index i = 0; i < before_eye.cols(); ++i) {
+    const bool expected = plate.hidden(before_eye.col(i));
+    behind_plate += expected ? 1 : 0;
+    REQUIRE((by_plate[static_cast<std::size_t>(i)] != 0) == expected);
+  }
+  CHECK(behind_plate > 500);
+  const auto nowhere = pose_of(0.4, Point(1, 0, 0), Point(0, std::numeric_limits<double>::quiet_NaN(), 1));
+  auto occlusion = scene_before(decant_test::pinhole, 1e-3);
+  occlusion.set_pose(0, nowhere);
+  decant::PointArray<float> points = decant::PointArray<float>::Random(3, 1000) * 0.4F;
+  std::vector<std::uint8_t> hidden(1000);
+  occlusion.find_hidden(points, {}, hidden);
+  for (decant::Index i = 0; i < points.cols(); ++i) {
+    REQUIRE((hidden[static_cast<std::size_t>(i)] != 0) == occlusion.hidden(points.col(i).cast<double>()));
+  }
+}
+
 TEST_CASE("What is no occlusion is refused in one line") {
   const PosedCamera<PinholeCamera> camera(decant_test::pinhole);
   CHECK_THROWS_WITH(RayOcclusion<PinholeCamera>(camera, -1.0),

@@ -107,5 +107,13 @@ TEST_CASE("Loops run on the threads that were asked for") {
   decant::parallel_ranges(4, Threads{1}, 1,
                           [&most](Index, Index) { most = std::max(most.load(), omp_get_num_threads()); });
   CHECK(most == 1);
+  // ranges of many rows or cells are few, and each of them is much
+  decant::parallel_ranges(64, Threads{2}, 32,
+                          [&most](Index, Index) { most = std::max(most.load(), omp_get_num_threads()); });
+  CHECK(most == 2);
+  most = 0;
+  decant::parallel_for(2 * decant::least_per_thread - 1, Threads{2},
+                       [&most](Index) { most = std::max(most.load(), omp_get_num_threads()); });
+  CHECK(most == 1);  // so few particles are not worth a second thread
 }
 #endif

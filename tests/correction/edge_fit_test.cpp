@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 // EdgeFit on single discs before straight edges, where the right move is known, and on a block of liquid.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <random>
 #include <vector>
 
 #include <decant/correction/edge_fit.hpp>
+#include <decant/coverage/detail/mask_disagreement.hpp>
 #include <decant/tracking/overlap.hpp>
 
 #include "catch.hpp"
@@ -127,6 +131,69 @@ TEMPLATE_TEST_CASE("edge fit: takes away most of what a block's silhouette is of
   INFO(before << " px before, " << wrong() << " px after");
   CHECK(wrong() < before / 3);
   CHECK((fluid.position - start.position).colwise().norm().maxCoeff() < TestType(0.004));
+}
+
+TEST_CASE("edge fit: where masks differ is found in any box, and nothing is found where they do not") {
+  std::mt19937 random(3);
+  const auto between = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+  decant::detail::MaskDisagreement disagreement;
+  int found = 0, nothing = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const int rows = between(1, 60), columns = between(1, 90);
+    decant::Mask a = decant::Mask::Zero(rows, columns);
+    for (Index k = 0; k < a.size(); ++k) {
+      a.data()[k] = static_cast<std::uint8_t>(between(0, 255));
+    }
+    decant::Mask b = a.unaryExpr([](std::uint8_t value) { return std::uint8_t(value >= 128 ? 255 : 3); });
+    for (int k = between(0, 4); k > 0; --k) {
+      std::uint8_t& pixel = b(between(0, rows - 1), between(0, columns - 1));
+      pixel = decant::is_liquid(pixel) ? 0 : 255;
+    }
+    disagreement.rebuild(a, b);
+    for (int k = 0; k < 20; ++k) {
+      const int u = between(0, columns), v = between(0, rows);
+      const decant::PixelBox box{u, v, std::min(columns, u + between(0, 20)), std::min(rows, v + between(0, 20))};
+      bool differ = false;
+      for (int row = box.v_begin; row < box.v_end; ++row) {
+        for (int column = box.u_begin; column < box.u_end; ++column) {
+          differ = differ || decant::is_liquid(a(row, column)) != decant::is_liquid(b(row, column));
+        }
+      }
+      REQUIRE((!differ || disagreement.any_in(box)));
+      found += differ ? 1 : 0;
+      nothing += disagreement.any_in(box) ? 0 : 1;
+    }
+  }
+  CHECK(found > 100);
+  CHECK(nothing > 1000);
+}
+
+TEST_CASE("edge fit: the same moves whatever else is in the image, and whatever was there in the call before") {
+  // the block's own edge, and another block beside it that both masks agree about
+  auto fluid = liquid_block<double>(Vector3<double>(-0.04, 0, 0));
+  Eye<double> eye(decant_test::before_the_block());
+  auto seen = fluid;
+  seen.position.row(0).array() += 0.002;
+  eye.observe(seen);
+  decant::EdgeFit<double> fit;
+  const auto alone = std::array{eye.predict(fluid)};
+  auto expected = fluid;
+  REQUIRE(fit.correct(expected, decant_test::observation(alone), 1.0 / 30).moved > 0);
+
+  const auto with_another = [](const decant::FluidState<double>& liquid) {
+    const auto other = liquid_block<double>(Vector3<double>(0.04, 0, 0));
+    decant::FluidState<double> both;
+    both.resize(liquid.size() + other.size());
+    both.position << liquid.position, other.position;
+    return both;
+  };
+  auto both = with_another(fluid);
+  eye.observe(with_another(seen));
+  const auto views = std::array{eye.predict(both)};
+  const decant::FluidState<double> before = both;
+  CHECK(fit.correct(both, decant_test::observation(views), 1.0 / 30).moved > 0);
+  CHECK(both.position.leftCols(fluid.size()) == expected.position);
+  CHECK(both.position.rightCols(fluid.size()) == before.position.rightCols(fluid.size()));
 }
 
 TEST_CASE("edge fit: settings are checked") {

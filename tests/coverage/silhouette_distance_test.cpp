@@ -6,6 +6,8 @@
 #include <random>
 #include <utility>
 
+#include <decant/coverage/detail/liquid_box.hpp>
+
 #include "catch.hpp"
 
 namespace {
@@ -106,6 +108,44 @@ TEST_CASE("A rebuild forgets the mask before, and takes a part of a larger image
   CHECK(transform.distance_px().minCoeff() == std::numeric_limits<float>::infinity());
   transform.rebuild(Mask(0, 0));
   CHECK(transform.distance_px().size() == 0);
+}
+
+TEST_CASE("Distances within a box that holds the liquid are those of the whole image") {
+  std::mt19937 random(6);
+  SilhouetteDistance whole, within;
+  for (int trial = 0; trial < 60; ++trial) {
+    Mask mask = Mask::Zero(90, 130);
+    const auto between = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
+    PixelBox liquid;
+    for (int k = between(0, 40); k > 0; --k) {
+      const int u = between(40, 100), v = between(20, 60);
+      mask(v, u) = 255;
+      liquid = liquid.hull({u, v, u + 1, v + 1});
+    }
+    CHECK(detail::liquid_box(mask) == liquid);
+    CHECK(detail::count_liquid(mask) == (mask >= 128).count());
+    CHECK(detail::count_liquid(mask, liquid) == (mask >= 128).count());
+    const PixelBox box = liquid.hull({between(0, 50), between(0, 30), between(51, 130), between(31, 90)});
+    whole.rebuild(mask);
+    within.rebuild(mask, box, MaskPart::Liquid, Threads{1 << trial % 3});
+    const auto part = [&](const auto& image) {
+      return image.block(box.v_begin, box.u_begin, box.height(), box.width());
+    };
+    CHECK((part(whole.distance_px()) == part(within.distance_px())).all());
+    CHECK((part(whole.nearest()) == part(within.nearest())).all());
+  }
+}
+
+TEST_CASE("The box of a mask's liquid reads bytes as is_liquid does") {
+  Mask mask = Mask::Constant(20, 70, 127);
+  CHECK(detail::liquid_box(mask).empty());
+  CHECK(detail::count_liquid(mask) == 0);
+  mask(3, 69) = 128;
+  mask(17, 0) = 255;
+  mask(9, 30) = 200;
+  CHECK(detail::liquid_box(mask) == PixelBox{0, 3, 70, 18});
+  CHECK(detail::liquid_box(mask.block(4, 1, 10, 60)) == PixelBox{29, 5, 30, 6});
+  CHECK(detail::count_liquid(mask) == 3);
 }
 
 TEST_CASE("Large images keep their exactness") {

@@ -79,6 +79,58 @@ TEST_CASE("PressureSystem: the corrected pressure of a free drop turns and pushe
   CHECK(torque.norm() < 1e-13 * size * 0.02);
 }
 
+TEST_CASE("PressureSystem in half precision: close to the exact one, and pairs push each other alike to rounding") {
+  const auto vary = [](auto& liquid) {
+    for (Index i = 0; i < liquid.fluid.size(); ++i) {
+      liquid.fluid.mass[i] *= 1 + static_cast<float>(i % 3) / 4;
+    }
+    liquid.update();
+  };
+  auto rough = loose_ball<decant::CubicSpline<float>>(0.005f, 5, 0.25, 0.1);
+  auto exact = loose_ball<Kernel>(0.005, 5, 0.25, 0.1);
+  for (const bool same_mass : {true, false}) {
+    if (!same_mass) {
+      vary(rough);
+      vary(exact);
+    }
+    PressureSystem<float> rough_plain, rough_corrected;
+    rough_plain.assemble(rough.view());
+    rough_corrected.correct(rough_plain, rough.view());
+    PressureSystem<double> plain, corrected;
+    plain.assemble(exact.view());
+    corrected.correct(plain, exact.view());
+    const auto count = static_cast<std::size_t>(exact.fluid.size());
+    std::vector<float> rough_pressure(count);
+    std::vector<double> pressure(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      rough_pressure[i] = 1 + 0.7f * std::sin(3.0f * static_cast<float>(i));
+      pressure[i] = static_cast<double>(rough_pressure[i]);
+    }
+    for (auto [rough_system, system] : {std::pair{&rough_plain, &plain}, std::pair{&rough_corrected, &corrected}}) {
+      rough_system->accelerate(rough.neighbors, rough_pressure.data(), {1});
+      system->accelerate(exact.neighbors, pressure.data(), {1});
+      Vector3<double> push = Vector3<double>::Zero();
+      double size = 0, off = 0, rate_off = 0, rate_size = 0;
+      for (Index i = 0; i < exact.fluid.size(); ++i) {
+        const Vector3<double> a =
+            Eigen::Map<const decant::Vector3<float>>(rough_system->accelerations() + 4 * i).cast<double>();
+        push += static_cast<double>(rough.fluid.mass[i]) * a;
+        size += static_cast<double>(rough.fluid.mass[i]) * a.norm();
+        off += static_cast<double>(rough.fluid.mass[i]) *
+               (a - Eigen::Map<const Vector3<double>>(system->accelerations() + 4 * i)).norm();
+        const double rate = system->density_rate(exact.neighbors, system->accelerations(), i, false);
+        rate_size += std::abs(rate);
+        rate_off += std::abs(rate - static_cast<double>(rough_system->density_rate(
+                                        rough.neighbors, rough_system->accelerations(), i, false)));
+      }
+      INFO("masses " << (same_mass ? "alike" : "different"));
+      CHECK(push.norm() < 1e-6 * size);
+      CHECK(off < 5e-4 * size);  // half precision rounds by at most 2^-11
+      CHECK(rate_off < 1e-3 * rate_size);
+    }
+  }
+}
+
 TEST_CASE("ComplementaritySolver: finds what projected Gauss-Seidel finds") {
   auto liquid = loose_ball<Kernel>(0.005, 4, 0.2, 0.1);
   const auto step = liquid.view();

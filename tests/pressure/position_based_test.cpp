@@ -2,6 +2,7 @@
 #include <decant/pressure/position_based.hpp>
 
 #include <cmath>
+#include <limits>
 
 #include <decant/kernel/cubic_spline.hpp>
 #include <decant/pressure/concept.hpp>
@@ -164,4 +165,41 @@ TEMPLATE_TEST_CASE("PositionBased reports what it did not reach and survives few
   liquid.time_step = 0;
   solve(solver, liquid);
   CHECK(liquid.fluid.velocity.cwiseAbs().maxCoeff() == 0);
+}
+
+TEMPLATE_TEST_CASE("PositionBased moves liquid of one mass, and liquid at rest, as it does any other", "", float,
+                   double) {
+  // a lone particle, far away, of another mass or with a speed: the others feel nothing of it, but are not alike
+  const auto with_one_more = [](TestType factor, TestType speed) {
+    auto liquid = ball<TestType>(0.96, 0.1, 0.0);
+    PointArray<TestType> places(3, liquid.fluid.size() + 1);
+    places << liquid.fluid.position, Vector3<TestType>(1, 0, 0);
+    const TestType mass = liquid.fluid.mass[0];
+    liquid.fluid.resize(places.cols());
+    liquid.fluid.mass.setConstant(mass);
+    liquid.place(places);
+    liquid.fluid.mass[liquid.fluid.size() - 1] = factor * mass;
+    liquid.fluid.velocity.setZero();
+    liquid.fluid.velocity(0, liquid.fluid.size() - 1) = speed;
+    liquid.update(PositionBased<TestType>::search_margin);
+    return liquid;
+  };
+  const auto moves = [&](TestType factor, TestType speed, bool measures) {
+    auto liquid = with_one_more(factor, speed);
+    PositionBased<TestType> solver;
+    solver.most_iterations = 3;
+    solver.recovery = 1;
+    solver.measures_what_is_left = measures;
+    const PressureReport report = solve(solver, liquid);
+    CHECK(report.density_iterations == 3);
+    CHECK((report.density_error > 0) == measures);
+    return PointArray<TestType>(liquid.fluid.velocity.leftCols(liquid.fluid.size() - 1));
+  };
+  const PointArray<TestType> alike = moves(1, 0, true), any = moves(2, 0, true), moving = moves(1, TestType(0.1), true);
+  const TestType largest = alike.cwiseAbs().maxCoeff();
+  const TestType rounding = 100 * std::numeric_limits<TestType>::epsilon() * largest;
+  CHECK(largest > 0);
+  CHECK((alike - any).cwiseAbs().maxCoeff() < rounding);
+  CHECK((alike - moving).cwiseAbs().maxCoeff() < rounding);
+  CHECK(moves(1, 0, false) == alike);
 }

@@ -162,3 +162,29 @@ TEMPLATE_TEST_CASE("A silhouette is where particles are, gaps closed", "", DiscS
   loose.render(PointArray<Scalar>(3, 0), {}, camera, {}, open);
   CHECK((open == 0).all());
 }
+
+TEMPLATE_TEST_CASE("What was drawn before leaves nothing in the next silhouette", "", DiscSplat<float>,
+                   ProjectedSphere<float>) {
+  std::mt19937 random(8);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  Silhouette<TestType> again(TestType(0.004), GapClosing(3));
+  for (int frame = 0; frame < 20; ++frame) {
+    // liquid that wanders through the image and beyond it; now and then the image is another one
+    const PinholeCamera camera(300, 300, 80, 60, frame % 7 < 5 ? 160 : 120, 120);
+    const Index count = frame % 4 == 3 ? 0 : 1500;
+    const Eigen::Vector2d place(between(-20, 180), between(-20, 140));
+    PointArray<float> position(3, count);
+    for (Index i = 0; i < count; ++i) {
+      const Eigen::Vector2d pixel = place + Eigen::Vector2d(between(-25, 25), between(-25, 25));
+      position.col(i) = camera.unproject(pixel, between(0.2, 0.4)).template cast<float>();
+    }
+    Mask mask(camera.height(), camera.width()), expected = mask;
+    Silhouette<TestType> fresh(TestType(0.004), GapClosing(3));
+    const PixelBox box = again.render(position, {}, camera, {}, mask, Threads{1 << frame % 3});
+    CHECK(box == fresh.render(position, {}, camera, {}, expected));
+    CHECK((mask == expected).all());
+    CHECK((again.coverage() == fresh.coverage()).all());
+  }
+}

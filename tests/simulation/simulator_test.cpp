@@ -360,3 +360,71 @@ TEST_CASE("simulator: moves that a corrector made end at walls, and crowded liqu
   CHECK(left_alone.fluid().density.maxCoeff() > 1.1f * 998);
   CHECK(relaxed < 1.05f * 998);
 }
+
+TEST_CASE("simulator: moves are adopted alike whether walls are remembered from the moves before or asked anew") {
+  const double d = 0.005;
+  SimulatorSettings settings = with_spacing(d);
+  settings.threads = {2};
+  settings.gravity.setZero();
+  settings.fixed_step = 1e-4;
+  settings.most_sub_steps = 20;
+  LiquidSimulator remembers(settings);
+  remembers.add_body("floor", Box{{-0.1, -0.1, -0.01}, {0.1, 0.1, 0}});
+  remembers.add_body("post", Box{{-0.01, -0.01, 0.001}, {0.01, 0.01, 0.1}}.mesh());
+  const auto places = block<float>(14, 14, 8, 1.1 * d, {0.011, -0.04, 0.001});
+  // at rest, and not too dense but where it is moved to: most stay where they are
+  remembers.add_particles(places, PointArray<float>::Zero(3, places.cols()), 0);
+  REQUIRE(remembers.step(1e-4).advanced());
+  LiquidSimulator asks = remembers;
+  Index cut_short = 0;
+  for (int pass = 0; pass < 9; ++pass) {
+    if (pass == 3) {  // bodies move on
+      for (LiquidSimulator* simulator : {&remembers, &asks}) {
+        simulator->move_body(1, {Eigen::Quaterniond::Identity(), {0.0005, 0, 0}}, 0.001);
+        REQUIRE(simulator->step(0.0005).advanced());
+      }
+    }
+    if (pass == 5) {  // one stands elsewhere at the same time
+      for (LiquidSimulator* simulator : {&remembers, &asks}) {
+        const Pose pose = simulator->bodies()[1].motion.at(simulator->time());
+        simulator->set_motion(1, PoseTrack({pose.rotation, pose.translation + Vector3<double>(4e-6, 0, 0)}));
+      }
+    }
+    if (pass == 7) {  // a frame fails while a body is on its way
+      for (LiquidSimulator* simulator : {&remembers, &asks}) {
+        simulator->move_body(1, {Eigen::Quaterniond::Identity(), {0.002, 0, 0}}, 0.01);
+        REQUIRE_FALSE(simulator->step(0.01).advanced());
+      }
+    }
+    asks.restore(asks.snapshot());
+    Index cut[2];
+    int k = 0;
+    for (LiquidSimulator* simulator : {&remembers, &asks}) {
+      const PointArray<float> before = simulator->fluid().position;
+      for (Index i = 0; i < before.cols(); i += 37) {
+        simulator->fluid().position.col(i) += Eigen::Vector3f(-0.004f, 0.001f, pass % 2 == 0 ? -0.003f : 0.002f);
+      }
+      cut[k++] = simulator->adopt_moves(before, 5 * d, pass == 6 ? 0 : 4);
+    }
+    CHECK(cut[0] == cut[1]);
+    cut_short += cut[0];
+    const auto &one = remembers.fluid(), &other = asks.fluid();
+    REQUIRE((one.id.array() == other.id.array()).all());
+    CHECK(PointArray<float>(one.position) == PointArray<float>(other.position));
+    CHECK(PointArray<float>(one.velocity) == PointArray<float>(other.velocity));
+    const auto &walls = remembers.walls(), &asked = asks.walls();
+    CHECK((walls.share.array() == asked.share.array()).all());
+    CHECK((walls.gradient.array() == asked.gradient.array()).all());
+    CHECK((walls.moment.array() == asked.moment.array()).all());
+    CHECK((walls.flux.array() == asked.flux.array()).all());
+    CHECK((walls.distance.array() == asked.distance.array()).all());
+    REQUIRE((walls.contact_count.array() == asked.contact_count.array()).all());
+    for (Index i = 0; i < one.size(); ++i) {
+      for (int contact = 0; contact < walls.contact_count[i]; ++contact) {
+        REQUIRE(walls.contacts_of(i)[contact].body == asked.contacts_of(i)[contact].body);
+        REQUIRE(walls.contacts_of(i)[contact].gradient == asked.contacts_of(i)[contact].gradient);
+      }
+    }
+  }
+  CHECK(cut_short > 0);
+}

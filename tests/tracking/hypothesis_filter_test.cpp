@@ -55,6 +55,11 @@ TEST_CASE("hypothesis filter: finds what is so, and gives up what is not", "[hyp
   CHECK(open.probability(2) > 0.9);
   CHECK(open.given_up(4));
   CHECK(open.probability(4) == 0);
+  // no more is known of it than when it was given up, by how much the best one then led
+  const auto lead = [](const auto& filter) { return filter.log_posterior(2) - filter.log_posterior(4); };
+  CHECK(lead(open) > -std::log(HypothesisFilterSettings{}.least_probability));
+  CHECK(lead(open) < 1000);
+  CHECK(lead(after<OpenLoop<double>>(10)) == Approx(lead(open)));
   double total = 0;
   for (std::size_t k = 0; k < open.size(); ++k) {
     total += open.probability(k);
@@ -117,6 +122,8 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
   CHECK(filter.track({0.1, {}, {}}).status == FrameStatus::Uncorrected);  // of the one that is left
   CHECK(filter.report(0).status == FrameStatus::ModelFailed);
   CHECK(filter.given_up(0));
+  CHECK(filter.log_posterior(0) == -std::numeric_limits<double>::infinity());
+  CHECK(filter.probability(1) == 1);
   CHECK(filter.best() == 1);
   CHECK(filter.track({0.2, {}, {}}).advanced());
   filter.tracker(1).model().broken = true;

@@ -135,7 +135,11 @@ class MeshWall {
     }
     const int i = cell[0] % block_cells, j = cell[1] % block_cells, k = cell[2] % block_cells;
     const Block& nodes = *block_data_[static_cast<std::size_t>(block)];
-    if (nodes.crossed[cell_number(i, j, k)]) {
+    const std::size_t number = cell_number(i, j, k);
+    if (!nodes.felt[number]) {
+      return LookUp::Far;  // most of the liquid: told by one bit, without a look at the nodes
+    }
+    if (nodes.crossed[number]) {
       return LookUp::Crossed;
     }
     StoredValues stored = StoredValues::Zero();
@@ -195,6 +199,7 @@ class MeshWall {
   struct Block {
     std::array<StoredValues, block_nodes * block_nodes * block_nodes> value;
     std::bitset<block_cells * block_cells * block_cells> crossed;
+    std::bitset<block_cells * block_cells * block_cells> felt;  ///< cells in which there may be a share
   };
 
   using Place = std::array<int, 3>;  // of a block in the table
@@ -274,6 +279,7 @@ class MeshWall {
     for_each_block([&](Block& block, const Place& place) { set_crossed(block, place); });
     for_each_block([&](Block& block, const Place& place) { set_sums(block, place); });
     for_each_block([&](Block& block, const Place& place) { copy_borders(block, place); });
+    for_each_block([&](Block& block, const Place&) { set_felt(block); });
   }
 
   double spacing_of_cell() const noexcept { return cell_ * cells_per_spacing; }
@@ -364,6 +370,22 @@ class MeshWall {
             block.crossed[cell_number(i, j, k)] =
                 surface_->closest_point(position(place, i + 0.5, j + 0.5, k + 0.5), half_diagonal).has_value();
           }
+        }
+      }
+    }
+  }
+
+  /// Where all corners are out of a plane's reach, so is what is interpolated between them.
+  void set_felt(Block& block) const noexcept {
+    for (int k = 0; k < block_cells; ++k) {
+      for (int j = 0; j < block_cells; ++j) {
+        for (int i = 0; i < block_cells; ++i) {
+          bool felt = block.crossed[cell_number(i, j, k)];
+          for (int corner = 0; corner < 8 && !felt; ++corner) {
+            const auto& node = block.value[node_number(i + (corner & 1), j + ((corner >> 1) & 1), k + (corner >> 2))];
+            felt = static_cast<double>(node[0]) < reach();
+          }
+          block.felt[cell_number(i, j, k)] = felt;
         }
       }
     }

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -55,6 +56,7 @@ class RigidBodies {
     Pose before{}, after{};               ///< at the ends of the current step
     RigidVelocity velocity{};             ///< between them
     double reach = 0;                     ///< the farthest that any point of the body moves between them [m]
+    double fastest = 0;                   ///< the speed of its bounds' fastest corner [m/s]
     Eigen::Isometry3d from_world_before =
         Eigen::Isometry3d::Identity();  ///< inverse of `before`, ready for many points
     Eigen::Isometry3d from_world_after = Eigen::Isometry3d::Identity();
@@ -105,11 +107,12 @@ class RigidBodies {
       }
       body.from_world_before = isometry(body.before.inverse());
       body.from_world_after = isometry(body.after.inverse());
-      body.reach = 0;
-      // a rigid displacement is affine in the place, so its largest size over a box is at a corner
+      body.reach = body.fastest = 0;
+      // rigid displacements and velocities are affine in the place, so they are largest at a corner of the box
       for (int corner = 0; corner < 8; ++corner) {
         const Vector3<double> x = body.bounds.corner(static_cast<Eigen::AlignedBox3d::CornerType>(corner));
         body.reach = std::max(body.reach, (body.after * x - body.before * x).norm());
+        body.fastest = std::max(body.fastest, body.velocity.at(body.before * x).norm());
       }
     }
   }
@@ -121,14 +124,21 @@ class RigidBodies {
   double largest_relative_speed(const FluidState<Scalar>& fluid, Threads threads,
                                 Reduction<double>& reduction) const noexcept {
     const bool all_move = !bodies_.empty() && std::all_of(bodies_.begin(), bodies_.end(), moves);
+    double fastest = 0;
+    for (const Body& body : bodies_) {
+      fastest = std::max(fastest, body.fastest);
+    }
     return reduction.over(
         fluid.size(), threads, 0.0,
         [&](Index begin, Index end) {
           double largest = 0;
           const auto take = [&largest](double speed) { largest = speed <= largest ? largest : speed; };  // NaN stays
           for (Index i = begin; i < end; ++i) {
-            const Vector3<double> x = fluid.position.col(i).template cast<double>();
             const Vector3<double> v = fluid.velocity.col(i).template cast<double>();
+            if (v.norm() + fastest <= largest) {
+              continue;  // whatever it is near
+            }
+            const Vector3<double> x = fluid.position.col(i).template cast<double>();
             if (v.squaredNorm() > largest * largest && has_left(x, v)) {
               continue;
             }
@@ -156,6 +166,17 @@ class RigidBodies {
     parallel_for(position.cols(), threads, [&](Index i) { sample_particle(i, position.col(i), spacing, walls); });
   }
 
+  /// As sample, for the particles with again[i] != 0 only: what `walls` has of the others is right.
+  /// @param again N entries.
+  void sample_again(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> again, double spacing,
+                    Threads threads, WallState<Scalar>& walls) const noexcept {
+    parallel_for(position.cols(), threads, [&](Index i) {
+      if (again[static_cast<std::size_t>(i)] != 0) {
+        sample_particle(i, position.col(i), spacing, walls);
+      }
+    });
+  }
+
   /// True if some wall stands between two points of the world at the start of the interval.
   bool separated(const Vector3<Scalar>& a, const Vector3<Scalar>& b, const WallContact<Scalar>* contacts,
                  int contact_count) const noexcept {
@@ -171,23 +192,23 @@ class RigidBodies {
 
   /// Moves particles that are inside of a body's material to the nearest place outside of it, `clearance` [m] off its
   /// surface, and to rest relative to it. For a body that is put where liquid is. @return how many were moved.
-  Index push_out(BodyId body_id, double clearance, FluidState<Scalar>& fluid) const {
+  Index push_out(BodyId body_id, double clearance, FluidState<Scalar>& fluid, Threads threads = {1}) const {
     const Body& body = bodies_[body_id];
     const Pose body_from_world = body.before.inverse();
-    Index moved = 0;
-    for (Index i = 0; i < fluid.size(); ++i) {
+    std::atomic<Index> moved{0};
+    parallel_for(fluid.size(), threads, [&](Index i) {
       const Vector3<double> x = body_from_world * fluid.position.col(i).template cast<double>();
       if (!body.bounds.contains(x) || !body.surface->inside_material(x)) {
-        continue;
+        return;
       }
       if (const auto near = body.surface->closest_point(x, body.bounds.diagonal().norm())) {
         const Vector3<double> out =
             near->distance > 1e-12 ? Vector3<double>((near->point - x) / near->distance) : near->normal;
         fluid.position.col(i) = (body.before * (near->point + clearance * out)).template cast<Scalar>();
         fluid.velocity.col(i).setZero();
-        ++moved;
+        moved.fetch_add(1, std::memory_order_relaxed);
       }
-    }
+    });
     return moved;
   }
 
@@ -269,8 +290,8 @@ class RigidBodies {
       share.body = static_cast<BodyId>(b);
       share.amount = sample.share;
       share.distance = sample.distance;
-      share.gradient = body.before.rotation * sample.gradient;
-      const Eigen::Matrix3d turn = body.before.rotation.toRotationMatrix();
+      const Eigen::Matrix3d turn = body.from_world_before.linear().transpose();
+      share.gradient = turn * sample.gradient;
       share.moment = turn * sample.moment * turn.transpose();
       const double steepness = share.gradient.norm();
       if (steepness > 0) {
@@ -287,12 +308,25 @@ class RigidBodies {
       }
       near[place_in_row] = share;
     }
-    combine(i, near, count, reach, spacing, walls);
+    if (count == 0) {
+      leave_free(i, walls);
+    } else {
+      combine(i, near, count, spacing, walls);
+    }
+  }
+
+  /// No wall is felt.
+  void leave_free(Index i, WallState<Scalar>& walls) const noexcept {
+    walls.share[i] = walls.flux[i] = 0;
+    walls.gradient.col(i).setZero();
+    walls.moment.col(i).setZero();
+    walls.distance[i] = static_cast<Scalar>(reach_);
+    walls.contact_count[i] = 0;
   }
 
   /// Bodies together: shares add up, but what is hidden behind a nearer body does not count.
-  void combine(Index i, std::array<Share, WallState<Scalar>::max_contacts>& near, std::size_t count, double reach,
-               double spacing, WallState<Scalar>& walls) const noexcept {
+  void combine(Index i, std::array<Share, WallState<Scalar>::max_contacts>& near, std::size_t count, double spacing,
+               WallState<Scalar>& walls) const noexcept {
     double amount = 0, flux = 0;
     Vector3<double> gradient = Vector3<double>::Zero();
     Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
@@ -331,7 +365,7 @@ class RigidBodies {
       }
     }
     walls.flux[i] = static_cast<Scalar>(flux);
-    walls.distance[i] = static_cast<Scalar>(count > 0 ? near[0].distance : reach);
+    walls.distance[i] = static_cast<Scalar>(near[0].distance);
     walls.contact_count[i] = static_cast<std::uint8_t>(count);
   }
 

@@ -4,8 +4,9 @@
 /// What the liquid feels of its walls, one entry per particle: all that pressure solvers and forces need to know about
 /// bodies, whatever these are made of.
 
-#include <array>
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include <decant/core/growable.hpp>
 #include <decant/core/types.hpp>
@@ -46,6 +47,17 @@ struct WallState {
     distance.set_count(count);
     contact_count.set_count(count);
     contacts.resize(static_cast<std::size_t>(count) * max_contacts);
+  }
+
+  /// Particle i is what another state's particle `from` is. Both are large enough.
+  void take(Index i, const WallState& other, Index from) {
+    share[i] = other.share[from];
+    gradient.col(i) = other.gradient.col(from);
+    moment.col(i) = other.moment.col(from);
+    flux[i] = other.flux[from];
+    distance[i] = other.distance[from];
+    contact_count[i] = other.contact_count[from];
+    std::copy_n(other.contacts_of(from), other.contact_count[from], contacts_of(i));
   }
 
   const WallContact<Scalar>* contacts_of(Index i) const {

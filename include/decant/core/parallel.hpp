@@ -31,19 +31,14 @@ struct Threads {
   }
 };
 
-/// Loops over fewer entries per thread than this are not shared out (but for a grain of 1, which says that one is
-/// much).
-inline constexpr Index least_per_thread = 512;
-
 /// Calls f(begin, end) for consecutive ranges that cover [0, count). Ranges are of `grain` entries (the last may be
-/// shorter) whatever the number of threads. f must not throw.
+/// shorter) whatever the number of threads, and are shared out however few they are: a range should be worth some
+/// microseconds, which is what waking a thread costs. f must not throw.
 template <class Function>
 void parallel_ranges(Index count, Threads threads, Index grain, Function&& f) {
   const Index ranges = (count + grain - 1) / grain;
 #ifdef _OPENMP
-  // waking a thread costs as much as working through some hundred particles
-  const Index worth = grain == 1 ? ranges : count / least_per_thread;
-  const int workers = static_cast<int>(std::min<Index>(threads.resolved(), worth));
+  const int workers = static_cast<int>(std::min<Index>(threads.resolved(), ranges));
   if (workers > 1) {
 #pragma omp parallel for schedule(static) num_threads(workers)
     for (Index r = 0; r < ranges; ++r) {
@@ -59,13 +54,21 @@ void parallel_ranges(Index count, Threads threads, Index grain, Function&& f) {
   }
 }
 
-/// Entries per range: small enough to share 8,000 particles evenly, large enough that starting a range costs nothing.
+/// Particles per range: few enough to share 8,000 particles evenly, enough that starting a range costs nothing.
 inline constexpr Index default_grain = 256;
 
-/// Calls f(i) for i in [0, count), in parallel. f writes only what belongs to i, and must not throw.
+/// Loops over fewer particles per thread than this are not shared out.
+inline constexpr Index least_per_thread = 512;
+
+/// As many threads as a loop over particles is worth.
+inline Threads threads_for(Index particles, Threads threads) {
+  return {static_cast<int>(std::clamp<Index>(particles / least_per_thread, 1, threads.resolved()))};
+}
+
+/// Calls f(i) for i in [0, count), particles, in parallel. f writes only what belongs to i, and must not throw.
 template <class Function>
 void parallel_for(Index count, Threads threads, Function&& f) {
-  parallel_ranges(count, threads, default_grain, [&f](Index begin, Index end) {
+  parallel_ranges(count, threads_for(count, threads), default_grain, [&f](Index begin, Index end) {
     for (Index i = begin; i < end; ++i) {
       f(i);
     }
@@ -81,7 +84,7 @@ class Reduction {
   Value over(Index count, Threads threads, Value start, RangeFunction&& f, Combine&& combine) {
     const Index ranges = (count + default_grain - 1) / default_grain;
     partial_.resize(static_cast<std::size_t>(ranges));
-    parallel_ranges(count, threads, default_grain, [&](Index begin, Index end) {
+    parallel_ranges(count, threads_for(count, threads), default_grain, [&](Index begin, Index end) {
       partial_[static_cast<std::size_t>(begin / default_grain)] = f(begin, end);
     });
     for (const Value& value : partial_) {

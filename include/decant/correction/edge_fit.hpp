@@ -14,8 +14,10 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
+#include <decant/coverage/detail/mask_disagreement.hpp>
 
 namespace decant {
 
@@ -68,10 +70,10 @@ class EdgeFit {
       place_discs(fluid, seen, view);
       push_back(view, seen.threads);
       pull_out(view);
-      for (std::size_t i = 0; i < discs_.size(); ++i) {
-        const Vector3<double> move = move_of(discs_[i], seen.spacing);
+      for (const Disc& disc : discs_) {
+        const Vector3<double> move = move_of(disc, seen.spacing);
         if (move.squaredNorm() > 0) {
-          fluid.position.col(static_cast<Index>(i)) += move.template cast<Scalar>();
+          fluid.position.col(disc.particle) += move.template cast<Scalar>();
           ++report.moved;
           total += move.norm();
         }
@@ -84,29 +86,50 @@ class EdgeFit {
  private:
   using Pixels = Eigen::Vector2d;
 
-  /// A particle in the image.
+  /// A particle in sight that masks disagree about.
   struct Disc {
+    Index particle = 0;
     Pixels center{0, 0};
-    double radius = 0;  ///< [px]; 0 if it is not in sight
+    double radius = 0;  ///< [px]
     Eigen::Matrix<double, 2, 3> jacobian = Eigen::Matrix<double, 2, 3>::Zero();
     Pixels wanted{0, 0};  ///< how it is to move [px]
     Pixels pull{0, 0};    ///< sum over the pixels that pull it
     int pulling = 0;      ///< how many
   };
 
+  /// The discs that have to do with a pixel on which the masks disagree: nothing moves any other.
   void place_discs(const FluidState<Scalar>& fluid, const Observation& seen,
                    const SilhouetteView<CameraType>& view) noexcept {
-    discs_.assign(static_cast<std::size_t>(fluid.size()), Disc{});
+    disagreement_.rebuild(*view.predicted, *view.observed);
+    concerned_.assign(static_cast<std::size_t>(fluid.size()), 0);
+    const auto disc_of = [&](Index i, const Projection& at) {
+      Disc disc;
+      disc.particle = i;
+      disc.center = at.pixel;
+      disc.jacobian = view.camera().jacobian(fluid.position.col(i).template cast<double>());
+      disc.radius = seen.radius * std::sqrt(0.5 * disc.jacobian.squaredNorm());
+      return disc;
+    };
+    const auto projection_of = [&](Index i) {
+      return view.camera().project(fluid.position.col(i).template cast<double>());
+    };
     parallel_for(fluid.size(), seen.threads, [&](Index i) {
-      const Vector3<double> x = fluid.position.col(i).template cast<double>();
-      const Projection at = view.camera().project(x);
-      if (view.hidden[static_cast<std::size_t>(i)] == 0 && at.visible) {
-        Disc& disc = discs_[static_cast<std::size_t>(i)];
-        disc.center = at.pixel;
-        disc.jacobian = view.camera().jacobian(x);
-        disc.radius = seen.radius * std::sqrt(0.5 * disc.jacobian.squaredNorm());
+      if (view.hidden[static_cast<std::size_t>(i)] != 0) {
+        return;
+      }
+      const Projection at = projection_of(i);
+      if (at.visible) {
+        const Disc disc = disc_of(i, at);
+        const PixelBox pixels = pixels_around(disc, settings_.reach_px, *view.observed);
+        concerned_[static_cast<std::size_t>(i)] = disc.radius > 0 && disagreement_.any_in(pixels) ? 1 : 0;
       }
     });
+    discs_.clear();
+    for (Index i = 0; i < fluid.size(); ++i) {
+      if (concerned_[static_cast<std::size_t>(i)] != 0) {
+        discs_.push_back(disc_of(i, projection_of(i)));
+      }
+    }
   }
 
   void push_back(const SilhouetteView<CameraType>& view, Threads threads) noexcept {
@@ -129,30 +152,36 @@ class EdgeFit {
 
   void pull_out(const SilhouetteView<CameraType>& view) noexcept {
     const Mask& observed = *view.observed;
-    rim_distance_.setConstant(observed.rows(), observed.cols(), unreached);
-    nearest_.resize(observed.rows(), observed.cols());
+    if (rim_distance_.rows() != observed.rows() || rim_distance_.cols() != observed.cols()) {
+      rim_distance_.setConstant(observed.rows(), observed.cols(), unreached);
+      nearest_.resize(observed.rows(), observed.cols());
+    }
+    reached_.clear();
     for (std::size_t i = 0; i < discs_.size(); ++i) {
       for_each_pixel(discs_[i], settings_.reach_px, observed, [&](Index v, Index u, const Pixels& offset) {
         if (is_liquid(observed(v, u)) && !is_liquid((*view.predicted)(v, u))) {
           const auto distance = static_cast<float>(offset.norm() - discs_[i].radius);
           if (distance < rim_distance_(v, u)) {
+            if (rim_distance_(v, u) == unreached) {
+              reached_.push_back(v * observed.cols() + u);
+            }
             rim_distance_(v, u) = distance;
             nearest_(v, u) = static_cast<std::int32_t>(i);
           }
         }
       });
     }
-    for (Index v = 0; v < observed.rows(); ++v) {
-      for (Index u = 0; u < observed.cols(); ++u) {
-        if (rim_distance_(v, u) < unreached) {
-          Disc& disc = discs_[static_cast<std::size_t>(nearest_(v, u))];
-          const Pixels offset = Pixels(static_cast<double>(u), static_cast<double>(v)) - disc.center;
-          // half a pixel more: a pixel is covered if its centre is within the disc
-          const double distance = std::max(0.0, static_cast<double>(rim_distance_(v, u))) + 0.5;
-          disc.pull += distance / offset.norm() * offset;
-          ++disc.pulling;
-        }
-      }
+    std::sort(reached_.begin(), reached_.end());
+    for (const Index pixel : reached_) {
+      float& rim_distance = rim_distance_.data()[pixel];
+      Disc& disc = discs_[static_cast<std::size_t>(nearest_.data()[pixel])];
+      const Pixels place(static_cast<double>(pixel % observed.cols()), static_cast<double>(pixel / observed.cols()));
+      const Pixels offset = place - disc.center;
+      // half a pixel more: a pixel is covered if its centre is within the disc
+      const double distance = std::max(0.0, static_cast<double>(rim_distance)) + 0.5;
+      disc.pull += distance / offset.norm() * offset;
+      ++disc.pulling;
+      rim_distance = unreached;
     }
     for (Disc& disc : discs_) {
       disc.wanted += settings_.pull / std::max(3, disc.pulling) * disc.pull;
@@ -172,20 +201,25 @@ class EdgeFit {
                : Vector3<double>::Zero();
   }
 
+  /// The pixels of an image that a square around a disc and `margin` more [px] has.
+  static PixelBox pixels_around(const Disc& disc, double margin, const Mask& image) noexcept {
+    const double radius = disc.radius + margin;
+    const auto within = [](double value, Index size) {
+      return static_cast<int>(std::clamp(value, 0.0, static_cast<double>(size)));
+    };
+    return {within(std::ceil(disc.center.x() - radius), image.cols()),
+            within(std::ceil(disc.center.y() - radius), image.rows()),
+            within(std::floor(disc.center.x() + radius) + 1, image.cols()),
+            within(std::floor(disc.center.y() + radius) + 1, image.rows())};
+  }
+
   /// Calls visit(v, u, offset from the centre) for the pixels of an image within `margin` of a disc [px].
   template <class Visit>
   static void for_each_pixel(const Disc& disc, double margin, const Mask& image, Visit visit) noexcept {
-    if (!(disc.radius > 0)) {
-      return;
-    }
     const double radius = disc.radius + margin;
-    const auto within = [](double value, Index size) {
-      return static_cast<Index>(std::clamp(value, 0.0, static_cast<double>(size)));
-    };
-    const Index v_end = within(std::floor(disc.center.y() + radius) + 1, image.rows());
-    const Index u_end = within(std::floor(disc.center.x() + radius) + 1, image.cols());
-    for (Index v = within(std::ceil(disc.center.y() - radius), image.rows()); v < v_end; ++v) {
-      for (Index u = within(std::ceil(disc.center.x() - radius), image.cols()); u < u_end; ++u) {
+    const PixelBox box = pixels_around(disc, margin, image);
+    for (Index v = box.v_begin; v < box.v_end; ++v) {
+      for (Index u = box.u_begin; u < box.u_end; ++u) {
         const Pixels offset = Pixels(static_cast<double>(u), static_cast<double>(v)) - disc.center;
         if (offset.squaredNorm() <= radius * radius) {
           visit(v, u, offset);
@@ -197,9 +231,13 @@ class EdgeFit {
   static constexpr float unreached = std::numeric_limits<float>::max();
 
   Settings settings_;
-  std::vector<Disc> discs_{};
-  Image<float> rim_distance_{};  ///< of observed pixels that no disc covers, to the disc nearest to them [px]
+  detail::MaskDisagreement disagreement_{};
+  std::vector<std::uint8_t> concerned_{};  ///< N, 1 for the particles of discs_
+  std::vector<Disc> discs_{};              ///< in the order of particles
+  /// Of observed pixels that no disc covers, to the disc nearest to them [px]; unreached between calls.
+  Image<float> rim_distance_{};
   Image<std::int32_t> nearest_{};
+  std::vector<Index> reached_{};  ///< these pixels, row by row
 };
 static_assert(Corrector<EdgeFit<>>);
 

@@ -7,13 +7,17 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
+#include <utility>
 #include <vector>
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/image.hpp>
+#include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
+#include <decant/coverage/detail/liquid_box.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 
 namespace decant {
@@ -79,6 +83,16 @@ class MassRelocation {
     double depth;
     double off_px;  ///< distance to observed liquid
   };
+  /// What a camera makes of a particle.
+  struct Seen {
+    Projection at;
+    double area_scale =
+        0;  ///< size in the image over size across the line of sight [px^2/m^2]; 0 if it is not in sight
+  };
+  struct Hidden {
+    double height;  ///< times gravity [m^2/s^2]
+    Index particle;
+  };
   struct Wanted {
     Eigen::Vector2d pixel;
     double off_px;  ///< distance to simulated liquid
@@ -86,15 +100,17 @@ class MassRelocation {
 
   Index relocate(FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
                  Mask& unexplained_before) noexcept {
-    const Index observed_px = (*view.observed >= 128).count(), predicted_px = (*view.predicted >= 128).count();
-    to_observed_.rebuild(*view.observed, MaskPart::Liquid, seen.threads);
-    to_predicted_.rebuild(*view.predicted, MaskPart::Liquid, seen.threads);
-    find_wanted(view, unexplained_before);
-    sort_particles(fluid, seen, view);
+    const PixelBox of_observed = detail::liquid_box(*view.observed), of_predicted = detail::liquid_box(*view.predicted);
+    const Index observed_px = detail::count_liquid(*view.observed, of_observed);
+    const Index predicted_px = detail::count_liquid(*view.predicted, of_predicted);
+    // asked at observed pixels
+    to_predicted_.rebuild(*view.predicted, of_predicted.hull(of_observed), MaskPart::Liquid, seen.threads);
+    find_wanted(view, of_observed, unexplained_before, seen.threads);
+    sort_particles(fluid, seen, view, of_observed);
 
     const Vector3<double> up = seen.gravity.norm() > 0 ? Vector3<double>(-seen.gravity.normalized())
                                                        : Vector3<double>(Vector3<double>::UnitZ());
-    const double area = particle_px(view, seen.spacing);
+    const double area = particle_px(seen.spacing);
     const auto most = static_cast<Index>(settings_.share_per_frame * static_cast<double>(fluid.size()));
     const auto share = [&](Index more, Index less) {
       return std::min(
@@ -102,7 +118,7 @@ class MassRelocation {
     };
     Index from_hidden = share(observed_px, predicted_px);
     Index taken = 0;
-    std::size_t next_misplaced = 0, next_hidden = 0;
+    std::size_t next_misplaced = 0;
     const double apart = std::sqrt(area);
     chosen_.clear();
     for (const Wanted& wanted : wanted_) {
@@ -120,8 +136,8 @@ class MassRelocation {
       if (next_misplaced < misplaced_.size()) {
         donor = in_sight_[misplaced_[next_misplaced++]].particle;
       } else {
-        while (from_hidden > 0 && next_hidden < hidden_.size() && donor < 0) {
-          const Index candidate = hidden_[next_hidden++];
+        while (from_hidden > 0 && !hidden_.empty() && donor < 0) {
+          const Index candidate = take_highest_hidden();
           const Vector3<double> x = fluid.position.col(candidate).template cast<double>();
           donor = up.dot(x - place) > -seen.spacing ? candidate : -1;
         }
@@ -134,32 +150,39 @@ class MassRelocation {
       chosen_.push_back(wanted.pixel);
       ++taken;
     }
-    return taken + send_back(fluid, seen, view, up, next_misplaced, next_hidden, share(predicted_px, observed_px));
+    return taken + send_back(fluid, seen, view, up, next_misplaced, share(predicted_px, observed_px));
   }
 
   /// Observed pixels that no simulated liquid is near, now and in the frame before; the farthest first.
-  void find_wanted(const SilhouetteView<CameraType>& view, Mask& unexplained_before) noexcept {
+  void find_wanted(const SilhouetteView<CameraType>& view, const PixelBox& of_observed, Mask& unexplained_before,
+                   Threads threads) noexcept {
     const Mask& observed = *view.observed;
-    unexplained_ = Mask::Zero(observed.rows(), observed.cols());
-    for (Index v = 0; v < observed.rows(); ++v) {
-      for (Index u = 0; u < observed.cols(); ++u) {
-        if (is_liquid(observed(v, u)) &&
-            static_cast<double>(to_predicted_.distance_px()(v, u)) > settings_.unexplained_px) {
-          unexplained_(v, u) = mask_liquid;
+    unexplained_.setZero(observed.rows(), observed.cols());
+    const auto for_each_observed = [&](auto&& visit) {
+      for (Index v = of_observed.v_begin; v < of_observed.v_end; ++v) {
+        for (Index u = of_observed.u_begin; u < of_observed.u_end; ++u) {
+          visit(v, u);
         }
       }
-    }
+    };
+    for_each_observed([&](Index v, Index u) {
+      if (is_liquid(observed(v, u)) &&
+          static_cast<double>(to_predicted_.distance_px()(v, u)) > settings_.unexplained_px) {
+        unexplained_(v, u) = mask_liquid;
+      }
+    });
     wanted_.clear();
     if (unexplained_before.rows() == observed.rows() && unexplained_before.cols() == observed.cols()) {
-      to_unexplained_.rebuild(unexplained_before);
-      for (Index v = 0; v < observed.rows(); ++v) {
-        for (Index u = 0; u < observed.cols(); ++u) {
+      const PixelBox now = detail::liquid_box(unexplained_), before = detail::liquid_box(unexplained_before);
+      if (!now.empty() && !before.empty()) {
+        to_unexplained_.rebuild(unexplained_before, now.hull(before), MaskPart::Liquid, threads);
+        for_each_observed([&](Index v, Index u) {
           if (is_liquid(unexplained_(v, u)) &&
               static_cast<double>(to_unexplained_.distance_px()(v, u)) <= settings_.persistence_px) {
             wanted_.push_back({{static_cast<double>(u), static_cast<double>(v)},
                                static_cast<double>(to_predicted_.distance_px()(v, u))});
           }
-        }
+        });
       }
       std::stable_sort(wanted_.begin(), wanted_.end(),
                        [](const Wanted& a, const Wanted& b) { return a.off_px > b.off_px; });
@@ -167,42 +190,72 @@ class MassRelocation {
     unexplained_before.swap(unexplained_);
   }
 
-  void sort_particles(const FluidState<Scalar>& fluid, const Observation& seen,
-                      const SilhouetteView<CameraType>& view) noexcept {
+  void sort_particles(const FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
+                      const PixelBox& of_observed) noexcept {
+    seen_.resize(static_cast<std::size_t>(fluid.size()));
+    parallel_for(fluid.size(), seen.threads, [&](Index i) {
+      const auto& camera = view.camera().camera();
+      const Vector3<double> x = view.camera().to_camera(fluid.position.col(i).template cast<double>());
+      Seen& particle = seen_[static_cast<std::size_t>(i)];
+      particle.at = camera.project(x);
+      if (particle.at.visible && view.hidden[static_cast<std::size_t>(i)] == 0) {
+        particle.area_scale = std::abs(camera.jacobian(x).template leftCols<2>().determinant());
+      }
+    });
     in_sight_.clear();
     misplaced_.clear();
     hidden_.clear();
     behind_walls_.clear();
+    PixelBox asked = of_observed;
+    total_area_scale_ = 0;
     for (Index i = 0; i < fluid.size(); ++i) {
-      const Projection at = view.camera().project(fluid.position.col(i).template cast<double>());
+      const auto& [at, area_scale] = seen_[static_cast<std::size_t>(i)];
       if (view.hidden[static_cast<std::size_t>(i)] != 0) {
-        hidden_.push_back(i);
+        hidden_.push_back({-seen.gravity.dot(fluid.position.col(i).template cast<double>()), i});
         if (at.visible) {
           behind_walls_.push_back({i, at.pixel, at.depth, 0});
         }
       } else if (at.visible) {
-        const auto v = static_cast<Index>(std::lround(at.pixel.y())), u = static_cast<Index>(std::lround(at.pixel.x()));
-        const double off = static_cast<double>(to_observed_.distance_px()(v, u));
-        if (off > settings_.misplaced_px) {
-          misplaced_.push_back(in_sight_.size());
-        }
-        in_sight_.push_back({i, at.pixel, at.depth, off});
+        in_sight_.push_back({i, at.pixel, at.depth, 0});
+        total_area_scale_ += area_scale;
+        const auto [v, u] = pixel_at(at.pixel);
+        asked = asked.hull({u, v, u + 1, v + 1});
+      }
+    }
+    std::make_heap(hidden_.begin(), hidden_.end(), lower);
+    to_observed_.rebuild(*view.observed, asked, MaskPart::Liquid, seen.threads);
+    for (std::size_t k = 0; k < in_sight_.size(); ++k) {
+      const auto [v, u] = pixel_at(in_sight_[k].pixel);
+      in_sight_[k].off_px = static_cast<double>(to_observed_.distance_px()(v, u));
+      if (in_sight_[k].off_px > settings_.misplaced_px) {
+        misplaced_.push_back(k);
       }
     }
     std::stable_sort(misplaced_.begin(), misplaced_.end(),
                      [&](std::size_t a, std::size_t b) { return in_sight_[a].off_px > in_sight_[b].off_px; });
-    const auto height = [&](Index i) { return -seen.gravity.dot(fluid.position.col(i).template cast<double>()); };
-    std::stable_sort(hidden_.begin(), hidden_.end(), [&](Index a, Index b) { return height(a) > height(b); });
+  }
+
+  /// Row and column; the image reaches half a pixel beyond the centres of its first ones.
+  static std::pair<int, int> pixel_at(const Eigen::Vector2d& pixel) noexcept {
+    return {std::max(0, static_cast<int>(std::lround(pixel.y()))),
+            std::max(0, static_cast<int>(std::lround(pixel.x())))};
+  }
+
+  /// Of two that are equally high, the one with the larger number counts as lower.
+  static bool lower(const Hidden& a, const Hidden& b) noexcept {
+    return a.height < b.height || (a.height == b.height && a.particle > b.particle);
+  }
+
+  Index take_highest_hidden() noexcept {
+    std::pop_heap(hidden_.begin(), hidden_.end(), lower);
+    const Index particle = hidden_.back().particle;
+    hidden_.pop_back();
+    return particle;
   }
 
   /// Area of one particle's share of a surface in the image [px^2], at the depth of the liquid in sight.
-  double particle_px(const SilhouetteView<CameraType>& view, double spacing) const noexcept {
-    double total = 0;
-    for (const InSight& seen : in_sight_) {
-      const auto jacobian = view.camera().camera().jacobian(view.camera().camera().unproject(seen.pixel, seen.depth));
-      total += std::abs(jacobian.template leftCols<2>().determinant());
-    }
-    const double mean = in_sight_.empty() ? 0 : total / static_cast<double>(in_sight_.size());
+  double particle_px(double spacing) const noexcept {
+    const double mean = in_sight_.empty() ? 0 : total_area_scale_ / static_cast<double>(in_sight_.size());
     return std::max(spacing * spacing * mean, 1.0);
   }
 
@@ -253,7 +306,7 @@ class MassRelocation {
   }
 
   Index send_back(FluidState<Scalar>& fluid, const Observation& seen, const SilhouetteView<CameraType>& view,
-                  const Vector3<double>& up, std::size_t next_misplaced, std::size_t next_hidden, Index most) noexcept {
+                  const Vector3<double>& up, std::size_t next_misplaced, Index most) noexcept {
     Index sent = 0;
     for (; next_misplaced < misplaced_.size() && sent < most; ++next_misplaced) {
       const InSight& misplaced = in_sight_[misplaced_[next_misplaced]];
@@ -262,8 +315,8 @@ class MassRelocation {
       }
       // on top of hidden liquid that stands higher: that is where it should still be
       bool found = false;
-      for (; next_hidden < hidden_.size() && !found; ++next_hidden) {
-        const Index below = hidden_[next_hidden];
+      while (!hidden_.empty() && !found) {
+        const Index below = take_highest_hidden();
         const Vector3<double> x = fluid.position.col(below).template cast<double>();
         const Vector3<double> place = x + 0.8 * seen.spacing * up;
         const Vector3<double> now = fluid.position.col(misplaced.particle).template cast<double>();
@@ -293,7 +346,9 @@ class MassRelocation {
   std::vector<InSight> in_sight_{};
   std::vector<std::size_t> misplaced_{};  ///< in in_sight_
   std::vector<InSight> behind_walls_{};   ///< but in the image
-  std::vector<Index> hidden_{};           ///< from the top
+  std::vector<Hidden> hidden_{};          ///< a heap, with the highest first
+  std::vector<Seen> seen_{};              ///< N
+  double total_area_scale_ = 0;           ///< of what is in sight
   std::vector<Wanted> wanted_{};
   std::vector<Eigen::Vector2d> chosen_{};
 };

@@ -4,16 +4,20 @@
 /// Which way, and how far, a predicted silhouette has to be moved to become the observed one.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include <decant/core/batch.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/types.hpp>
+#include <decant/coverage/detail/liquid_box.hpp>
 
 namespace decant {
 
@@ -60,14 +64,17 @@ class SilhouetteTransport {
   /// Matches two masks of one size. @return false if either is empty: displacement() is then zero everywhere.
   bool match(ConstMaskView predicted, ConstMaskView observed) {
     nodes_x_ = nodes_y_ = 0;
-    Box box;
-    if (predicted.rows() != observed.rows() || predicted.cols() != observed.cols() || !box.include(predicted) ||
-        !box.include(observed)) {
+    if (predicted.rows() != observed.rows() || predicted.cols() != observed.cols()) {
       return false;
     }
+    const PixelBox of_predicted = detail::liquid_box(predicted), of_observed = detail::liquid_box(observed);
+    if (of_predicted.empty() || of_observed.empty()) {
+      return false;
+    }
+    const PixelBox box = of_predicted.hull(of_observed);
     lay_grid(box);
-    spread(predicted, box, from_);
-    spread(observed, box, to_);
+    spread(predicted, of_predicted, from_);
+    spread(observed, of_observed, to_);
     find_scales();
     find_debiasing_scales();
     find_displacements();
@@ -100,35 +107,14 @@ class SilhouetteTransport {
  private:
   using Grid = Eigen::Array<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-  /// The pixels that liquid lies in.
-  struct Box {
-    Index top = std::numeric_limits<Index>::max(), bottom = -1, left = top, right = -1;
-
-    bool include(const ConstMaskView& mask) noexcept {
-      bool any = false;
-      for (Index row = 0; row < mask.rows(); ++row) {
-        for (Index column = 0; column < mask.cols(); ++column) {
-          if (is_liquid(mask(row, column))) {
-            any = true;
-            top = std::min(top, row);
-            bottom = std::max(bottom, row);
-            left = std::min(left, column);
-            right = std::max(right, column);
-          }
-        }
-      }
-      return any;
-    }
-  };
-
   /// A silhouette on the grid.
   struct Silhouette {
     std::vector<Index> nodes{};      ///< that have mass
     Eigen::ArrayXd mass{}, scale{};  ///< of these [px^2]; scale: v of the matching, or u0 of the prediction with itself
   };
 
-  void lay_grid(const Box& box) {
-    const auto width = static_cast<double>(box.right - box.left), height = static_cast<double>(box.bottom - box.top);
+  void lay_grid(const PixelBox& box) {
+    const auto width = static_cast<double>(box.width() - 1), height = static_cast<double>(box.height() - 1);
     for (spacing_ = settings_.cell_px;; spacing_ *= 1.25) {
       nodes_x_ = static_cast<Index>(width / spacing_) + 2 + 2 * margin_nodes;
       nodes_y_ = static_cast<Index>(height / spacing_) + 2 + 2 * margin_nodes;
@@ -136,8 +122,8 @@ class SilhouetteTransport {
         break;
       }
     }
-    origin_ = {static_cast<double>(box.left) - margin_nodes * spacing_,
-               static_cast<double>(box.top) - margin_nodes * spacing_};
+    origin_ = {static_cast<double>(box.u_begin) - margin_nodes * spacing_,
+               static_cast<double>(box.v_begin) - margin_nodes * spacing_};
     // the blur grows with the nodes' distance: a kernel narrower than that would not see its neighbors
     blur_ = settings_.blur_px * spacing_ / settings_.cell_px;
     const auto radius = static_cast<Index>(std::sqrt(-std::log(kernel_floor)) * blur_ / spacing_);
@@ -145,19 +131,19 @@ class SilhouetteTransport {
     for (Index k = 0; k <= radius; ++k) {
       weights_[k] = std::exp(-std::pow(static_cast<double>(k) * spacing_ / blur_, 2));
     }
-    for (Grid* grid : {&values_, &rows_done_, &product_, &shift_x_, &shift_y_}) {
+    for (Grid* grid : {&values_, &product_, &shift_x_, &shift_y_}) {
       grid->resize(nodes_y_, nodes_x_);
     }
   }
 
   /// Each pixel's mass goes to the four nodes around it, by its distance to them: the centroid stays where it is.
-  void spread(const ConstMaskView& mask, const Box& box, Silhouette& silhouette) {
+  void spread(const ConstMaskView& mask, const PixelBox& box, Silhouette& silhouette) {
     values_.setZero();
-    for (Index row = box.top; row <= box.bottom; ++row) {
+    for (Index row = box.v_begin; row < box.v_end; ++row) {
       const double y = (static_cast<double>(row) - origin_.y()) / spacing_;
       const auto top = static_cast<Index>(y);
       const double lower_share = y - static_cast<double>(top);
-      for (Index column = box.left; column <= box.right; ++column) {
+      for (Index column = box.u_begin; column < box.u_end; ++column) {
         if (is_liquid(mask(row, column))) {
           const double x = (static_cast<double>(column) - origin_.x()) / spacing_;
           const auto left = static_cast<Index>(x);
@@ -186,21 +172,75 @@ class SilhouetteTransport {
     }
   }
 
-  /// product = kernel * values, on all nodes.
+  /// product = kernel * values, on all nodes. Some columns at a time stay in registers for all weights, and each node's
+  /// terms are added from the nearest to the farthest.
   void convolve(const Grid& values, Grid& product) {
     const Index radius = weights_.size() - 1;
+    const Index stride = (nodes_x_ + block_columns - 1) / block_columns * block_columns;
+    padded_.setZero(stride + 2 * radius);
+    rows_done_.resize(nodes_y_ * stride);
     for (Index row = 0; row < nodes_y_; ++row) {
-      auto out = rows_done_.row(row);
-      out = values.row(row);  // the weight in the middle is 1
-      for (Index k = 1; k <= std::min(radius, nodes_x_ - 1); ++k) {
-        out.head(nodes_x_ - k) += weights_[k] * values.row(row).tail(nodes_x_ - k);
-        out.tail(nodes_x_ - k) += weights_[k] * values.row(row).head(nodes_x_ - k);
+      double* const out = rows_done_.data() + row * stride;
+      if ((values.row(row) == 0).all()) {
+        std::fill_n(out, stride, 0.0);
+        continue;
+      }
+      std::copy_n(&values(row, 0), nodes_x_, padded_.data() + radius);
+      for (Index column = 0; column < stride; column += block_columns) {
+        const double* const from = padded_.data() + radius + column;
+        Block sum = load(from);
+        for (Index k = 1; k <= radius; ++k) {
+          add(weights_[k], from + k, sum);
+          add(weights_[k], from - k, sum);
+        }
+        store(sum, out + column);
       }
     }
-    product = rows_done_;
-    for (Index k = 1; k <= std::min(radius, nodes_y_ - 1); ++k) {
-      product.topRows(nodes_y_ - k) += weights_[k] * rows_done_.bottomRows(nodes_y_ - k);
-      product.bottomRows(nodes_y_ - k) += weights_[k] * rows_done_.topRows(nodes_y_ - k);
+    product.resize(nodes_y_, nodes_x_);
+    std::array<double, block_columns> last;
+    for (Index row = 0; row < nodes_y_; ++row) {
+      for (Index column = 0; column < nodes_x_; column += block_columns) {
+        const double* const from = rows_done_.data() + row * stride + column;
+        Block sum = load(from);
+        for (Index k = 1; k <= std::min(radius, nodes_y_ - 1); ++k) {
+          if (row + k < nodes_y_) {
+            add(weights_[k], from + k * stride, sum);
+          }
+          if (row >= k) {
+            add(weights_[k], from - k * stride, sum);
+          }
+        }
+        double* const out = &product(row, column);
+        if (column + block_columns <= nodes_x_) {
+          store(sum, out);
+        } else {
+          store(sum, last.data());
+          std::copy_n(last.data(), nodes_x_ - column, out);
+        }
+      }
+    }
+  }
+
+  using B = Batch<double>;
+  static constexpr std::size_t block_batches = 4;
+  static constexpr Index block_columns = static_cast<Index>(block_batches) * B::width;
+  using Block = std::array<B, block_batches>;
+
+  [[gnu::always_inline]] static Block load(const double* from) noexcept {
+    return [from]<std::size_t... batch>(std::index_sequence<batch...>) {
+      return Block{B::load(from + static_cast<Index>(batch) * B::width)...};
+    }
+    (std::make_index_sequence<block_batches>{});
+  }
+  [[gnu::always_inline]] static void store(const Block& block, double* to) noexcept {
+    for (std::size_t batch = 0; batch < block_batches; ++batch) {
+      block[batch].store(to + static_cast<Index>(batch) * B::width);
+    }
+  }
+  [[gnu::always_inline]] static void add(double weight, const double* from, Block& sum) noexcept {
+    const B factor(weight);
+    for (std::size_t batch = 0; batch < block_batches; ++batch) {
+      sum[batch] = multiply_add(factor, B::load(from + static_cast<Index>(batch) * B::width), sum[batch]);
     }
   }
 
@@ -300,8 +340,8 @@ class SilhouetteTransport {
 
   Settings settings_;
   Silhouette from_{}, to_{};
-  Eigen::ArrayXd weights_{}, gathered_{}, moments_{};
-  Grid values_{}, rows_done_{}, product_{}, total_{}, total_self_{}, shift_x_{}, shift_y_{};
+  Eigen::ArrayXd weights_{}, gathered_{}, moments_{}, padded_{}, rows_done_{};
+  Grid values_{}, product_{}, total_{}, total_self_{}, shift_x_{}, shift_y_{};
   Eigen::Array<bool, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> near_prediction_{};
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   double spacing_ = 1, blur_ = 1;

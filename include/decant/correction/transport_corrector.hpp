@@ -25,8 +25,7 @@ struct TransportPass {
 /// Settings of TransportCorrector.
 struct TransportCorrectorSettings {
   /// Coarse to fine: far moves first, edges last.
-  std::vector<TransportPass> passes{{8, 10, 0.4}, {5, 7, 0.6}, {4, 4, 0.8},
-                                    {4, 4, 0.8},  {3, 3, 0.8}, {3, 3, 0.8}};
+  std::vector<TransportPass> passes{{8, 10, 0.4}, {5, 7, 0.6}, {4, 4, 0.8}, {4, 4, 0.8}, {3, 3, 0.8}, {3, 3, 0.8}};
   double dead_zone_px = 0;      ///< shorter moves are noise of the mask's edge, >= 0
   double velocity_gate_px = 2;  ///< shorter moves leave velocities alone, >= 0
   double longest_move = 0.008;  ///< per pass [m], > 0
@@ -70,12 +69,13 @@ class TransportCorrector {
   CorrectionReport correct(FluidState<Scalar>& fluid, const Observation& seen, Scalar dt) noexcept {
     CorrectionReport report;
     const auto pass = static_cast<std::size_t>(std::clamp(seen.pass, 0, passes() - 1));
-    normal_.assign(static_cast<std::size_t>(fluid.size()), Normal{});
+    normal_.resize(static_cast<std::size_t>(fluid.size()));
+    displacement_px_.assign(static_cast<std::size_t>(fluid.size()), not_in_sight);
     bool any = false;
     for (const SilhouetteView<CameraType>& view : seen.views) {
       if (transports_[pass].match(*view.predicted, *view.observed)) {
         any = true;
-        gather(fluid, view, transports_[pass], seen.threads);
+        gather(fluid, view, transports_[pass], seen.views.size() == 1, seen.threads);
       }
     }
     if (!any || !(dt > 0)) {
@@ -83,10 +83,11 @@ class TransportCorrector {
     }
     double total = 0;
     for (Index i = 0; i < fluid.size(); ++i) {
-      const Normal& normal = normal_[static_cast<std::size_t>(i)];
-      if (!(normal.displacement_px > 0)) {
+      const double displacement_px = displacement_px_[static_cast<std::size_t>(i)];
+      if (!(displacement_px > 0)) {
         continue;
       }
+      const Normal& normal = normal_[static_cast<std::size_t>(i)];
       // so little that it only decides what no view sees
       const double damping = 1e-4 * normal.square.trace();
       Vector3<double> move = (normal.square + damping * Matrix3<double>::Identity()).ldlt().solve(normal.wanted);
@@ -95,7 +96,7 @@ class TransportCorrector {
         continue;
       }
       move *= std::min(1.0, settings_.longest_move / length);
-      const double above_gate = std::max(0.0, 1 - settings_.velocity_gate_px / normal.displacement_px);
+      const double above_gate = std::max(0.0, 1 - settings_.velocity_gate_px / displacement_px);
       Vector3<double> velocity = fluid.velocity.col(i).template cast<double>() +
                                  settings_.passes[pass].velocity_share * above_gate / static_cast<double>(dt) * move;
       const double speed = velocity.norm();
@@ -118,11 +119,11 @@ class TransportCorrector {
   struct Normal {
     Matrix3<double> square = Matrix3<double>::Zero();  ///< sum of J' J
     Vector3<double> wanted = Vector3<double>::Zero();  ///< sum of J' d
-    double displacement_px = 0;                        ///< the longest d
   };
 
+  /// @param alone whether no other view has a say: what this one leaves where it is then stays.
   void gather(const FluidState<Scalar>& fluid, const SilhouetteView<CameraType>& view,
-              const SilhouetteTransport& transport, Threads threads) noexcept {
+              const SilhouetteTransport& transport, bool alone, Threads threads) noexcept {
     parallel_for(fluid.size(), threads, [&](Index i) {
       const auto own = static_cast<std::size_t>(i);
       if (view.hidden[own] != 0) {
@@ -140,17 +141,27 @@ class TransportCorrector {
       } else {
         d *= 1 - settings_.dead_zone_px / length;
       }
-      const Eigen::Matrix<double, 2, 3> jacobian = view.camera().jacobian(x);
+      if (alone && d.isZero(0)) {
+        return;
+      }
       Normal& normal = normal_[own];
+      double& displacement_px = displacement_px_[own];
+      if (displacement_px == not_in_sight) {
+        normal = {};
+      }
+      const Eigen::Matrix<double, 2, 3> jacobian = view.camera().jacobian(x);
       normal.square += jacobian.transpose() * jacobian;
       normal.wanted += jacobian.transpose() * d;
-      normal.displacement_px = std::max(normal.displacement_px, d.norm());
+      displacement_px = std::max(displacement_px, d.norm());
     });
   }
 
   Settings settings_;
   std::vector<SilhouetteTransport> transports_{};
-  std::vector<Normal> normal_{};
+  static constexpr double not_in_sight = -1;
+
+  std::vector<Normal> normal_{};           ///< of particles in sight
+  std::vector<double> displacement_px_{};  ///< the longest d of each particle, or not_in_sight
 };
 static_assert(Corrector<TransportCorrector<>>);
 

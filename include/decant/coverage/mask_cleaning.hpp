@@ -58,22 +58,39 @@ class MaskCleaning {
     for (Index first = 0; first < columns; first += tile) {
       const Index left = std::max<Index>(0, first - reach);
       const Index right = std::min(columns, first + tile + reach);
-      std::array<std::uint8_t, tile + widest> liquid{};  // in the window's part of each column
+      // in the window's part of each column; `reach` columns that may not exist are on either side
+      std::array<std::uint8_t, tile + 2 * (widest / 2)> liquid{};
+      std::uint8_t* const columns_of_window = liquid.data() + reach - first;
       for (Index y = top; y < bottom; ++y) {
         const std::uint8_t* const from = raw.data() + y * raw.outerStride();
         for (Index u = left; u < right; ++u) {
-          liquid[static_cast<std::size_t>(u - left)] =
-              static_cast<std::uint8_t>(liquid[static_cast<std::size_t>(u - left)] + (is_liquid(from[u]) ? 1 : 0));
+          columns_of_window[u] = static_cast<std::uint8_t>(columns_of_window[u] + (from[u] >> 7U));
         }
       }
-      std::uint8_t* const to = &clean(v, 0);
-      for (Index u = first; u < std::min(columns, first + tile); ++u) {
-        const Index begin = std::max<Index>(0, u - reach), end = std::min(columns, u + reach + 1);
-        int sum = 0;
-        for (Index x = begin; x < end; ++x) {
-          sum += liquid[static_cast<std::size_t>(x - left)];
+      std::array<std::uint8_t, tile> sums{};  // at most 15 x 15
+      for (Index x = 0; x < window_; ++x) {
+        for (Index k = 0; k < tile; ++k) {
+          const auto own = static_cast<std::size_t>(k);
+          sums[own] = static_cast<std::uint8_t>(sums[own] + liquid[own + static_cast<std::size_t>(x)]);
         }
-        to[u] = 2 * sum > (end - begin) * (bottom - top) ? mask_liquid : std::uint8_t{0};
+      }
+      const Index last = std::min(columns, first + tile);
+      std::uint8_t* const to = &clean(v, 0);
+      const auto decide = [&](Index begin, Index end, Index width) {
+        const auto half = static_cast<std::uint8_t>(width * (bottom - top) / 2);
+        for (Index u = begin; u < end; ++u) {
+          to[u] = sums[static_cast<std::size_t>(u - first)] > half ? mask_liquid : std::uint8_t{0};
+        }
+      };
+      // near the border fewer columns vote
+      const Index inner_begin = std::min(std::max(first, reach), last);
+      const Index inner_end = std::max(std::min(last, columns - reach), inner_begin);
+      for (Index u = first; u < inner_begin; ++u) {
+        decide(u, u + 1, std::min(columns, u + reach + 1) - std::max<Index>(0, u - reach));
+      }
+      decide(inner_begin, inner_end, window_);
+      for (Index u = inner_end; u < last; ++u) {
+        decide(u, u + 1, std::min(columns, u + reach + 1) - std::max<Index>(0, u - reach));
       }
     }
   }

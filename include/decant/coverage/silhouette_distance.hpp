@@ -12,6 +12,7 @@
 
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/types.hpp>
 
 namespace decant {
@@ -29,23 +30,34 @@ class SilhouetteDistance {
   /// Allocates only if the mask is larger, or there are more threads, than ever before; results do not depend on the
   /// number of threads. @param mask up to 32768 x 32768 pixels; bytes as is_liquid reads them.
   void rebuild(const ConstMaskView& mask, MaskPart part = MaskPart::Liquid, Threads threads = {}) noexcept {
+    rebuild(mask, PixelBox::of(mask), part, threads);
+  }
+
+  /// The same for the pixels of a box alone, in a time that goes by the box's size: what is outside of it has no
+  /// meaning afterwards. @param box lies on the mask, and holds all pixels of the part that distances are to lead to.
+  void rebuild(const ConstMaskView& mask, const PixelBox& box, MaskPart part = MaskPart::Liquid,
+               Threads threads = {}) noexcept {
     if (distance_.rows() != mask.rows() || distance_.cols() != mask.cols()) {
       distance_.resize(mask.rows(), mask.cols());
       nearest_.resize(mask.rows(), mask.cols());
     }
-    const Index columns = mask.cols();
-    parallel_ranges(columns, threads, columns_per_range,
-                    [&](Index begin, Index end) { nearest_in_columns(mask, part, begin, end); });
+    if (box.empty()) {
+      return;
+    }
+    const Index columns = box.width();
+    parallel_ranges(columns, threads, columns_per_range, [&](Index begin, Index end) {
+      nearest_in_columns(mask, part, box, box.u_begin + begin, box.u_begin + end);
+    });
 
     // each comb has room for one row's envelope
-    const Index combs = std::max<Index>(1, std::min<Index>(threads.resolved(), mask.rows()));
+    const Index combs = std::max<Index>(1, std::min<Index>(threads.resolved(), box.height()));
     const std::size_t room = static_cast<std::size_t>(combs) * static_cast<std::size_t>(columns);
     if (envelopes_.size() < room) {
       envelopes_.resize(room);
     }
     parallel_ranges(combs, threads, 1, [&](Index comb, Index) {
-      for (Index v = comb; v < mask.rows(); v += combs) {
-        lower_envelope(v, envelopes_.data() + comb * columns);
+      for (Index v = box.v_begin + comb; v < box.v_end; v += combs) {
+        lower_envelope(v, box, envelopes_.data() + comb * columns);
       }
     });
   }
@@ -68,20 +80,21 @@ class SilhouetteDistance {
   };
 
   // nearest_ holds rows until lower_envelope turns them into pixels; -1 where a column is empty.
-  void nearest_in_columns(const ConstMaskView& mask, MaskPart part, Index begin, Index end) noexcept {
+  void nearest_in_columns(const ConstMaskView& mask, MaskPart part, const PixelBox& box, Index begin,
+                          Index end) noexcept {
     const bool wanted = part == MaskPart::Liquid;
-    const Index rows = mask.rows(), columns = mask.cols();
+    const Index columns = mask.cols();
     const Index stride = mask.outerStride();
     std::int32_t* const nearest = nearest_.data();
-    for (Index v = 0; v < rows; ++v) {
+    for (Index v = box.v_begin; v < box.v_end; ++v) {
       const std::uint8_t* const pixel = mask.data() + v * stride;
       std::int32_t* const row = nearest + v * columns;
       for (Index u = begin; u < end; ++u) {
-        const std::int32_t above = v > 0 ? row[u - columns] : -1;
+        const std::int32_t above = v > box.v_begin ? row[u - columns] : -1;
         row[u] = is_liquid(pixel[u]) == wanted ? static_cast<std::int32_t>(v) : above;
       }
     }
-    for (Index v = rows - 2; v >= 0; --v) {
+    for (Index v = box.v_end - 2; v >= box.v_begin; --v) {
       std::int32_t* const row = nearest + v * columns;
       for (Index u = begin; u < end; ++u) {
         const auto here = static_cast<std::int32_t>(v);
@@ -92,12 +105,12 @@ class SilhouetteDistance {
     }
   }
 
-  void lower_envelope(Index v, Parabola* envelope) noexcept {
+  void lower_envelope(Index v, const PixelBox& box, Parabola* envelope) noexcept {
     const Index columns = nearest_.cols();
     std::int32_t* const nearest = &nearest_(v, 0);
     float* const distance = &distance_(v, 0);
     Index last = -1;
-    for (Index u = 0; u < columns; ++u) {
+    for (Index u = box.u_begin; u < box.u_end; ++u) {
       if (nearest[u] < 0) {
         continue;
       }
@@ -116,11 +129,11 @@ class SilhouetteDistance {
       envelope[++last] = next;
     }
     if (last < 0) {
-      std::fill(distance, distance + columns, std::numeric_limits<float>::infinity());
+      std::fill(distance + box.u_begin, distance + box.u_end, std::numeric_limits<float>::infinity());
       return;
     }
     Index lowest = 0;
-    for (Index u = 0; u < columns; ++u) {
+    for (Index u = box.u_begin; u < box.u_end; ++u) {
       while (lowest < last && envelope[lowest + 1].begin < static_cast<double>(u)) {
         ++lowest;
       }

@@ -33,18 +33,15 @@ class GradientCorrection {
   /// For the particles, neighbours and walls of a sub-step; step is a StepView.
   template <class Step>
   void compute(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     first_.resize(4 * static_cast<std::size_t>(count));
     second_.resize(4 * static_cast<std::size_t>(count));
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(count, step.threads, [&](Index i) {
       const B zero(Scalar(0));
       B xx = zero, xy = zero, xz = zero, yy = zero, yz = zero, zz = zero;
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope = gather(mass, pair.neighbor) *
-                        Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const B slope = step.mass(pair.neighbor) * step.pairs.slope(pair.slot);
         const B x = slope * pair.x, y = slope * pair.y, z = slope * pair.z;
         xx = multiply_add(x, pair.x, xx);
         xy = multiply_add(x, pair.y, xy);
@@ -77,13 +74,28 @@ class GradientCorrection {
     return squared > 0 ? Vector3<Scalar>(g.dot(apply(i, g)) / squared * g) : g;
   }
 
+  /// L_i times the gradient in each lane, rounded as by the function below: what two particles do to each other stays
+  /// equal to the last bit.
+  [[gnu::always_inline]] Batch3<Scalar> apply(Index i, const Batch3<Scalar>& g) const noexcept {
+    using B = Batch<Scalar>;
+    const Scalar* a = &first_[4 * static_cast<std::size_t>(i)];
+    const Scalar* b = &second_[4 * static_cast<std::size_t>(i)];
+    return product({B(a[0]), B(a[1]), B(a[2])}, {B(b[0]), B(b[1]), B(b[2])}, g);
+  }
+
   /// L_j times a gradient for each lane's j.
   [[gnu::always_inline]] Batch3<Scalar> apply(const std::uint32_t* index, const Batch3<Scalar>& g) const noexcept {
-    const Batch3<Scalar> a = gather3(first_.data(), index), b = gather3(second_.data(), index);
-    return {a.x * g.x + a.y * g.y + a.z * g.z, a.y * g.x + b.x * g.y + b.y * g.z, a.z * g.x + b.y * g.y + b.z * g.z};
+    return product(gather3(first_.data(), index), gather3(second_.data(), index), g);
   }
 
  private:
+  [[gnu::always_inline]] static Batch3<Scalar> product(const Batch3<Scalar>& a, const Batch3<Scalar>& b,
+                                                       const Batch3<Scalar>& g) noexcept {
+    return {multiply_add(a.z, g.z, multiply_add(a.y, g.y, a.x * g.x)),
+            multiply_add(b.y, g.z, multiply_add(b.x, g.y, a.y * g.x)),
+            multiply_add(b.z, g.z, multiply_add(b.y, g.y, a.z * g.x))};
+  }
+
   /// A symmetric matrix.
   struct Symmetric {
     Scalar xx, xy, xz, yy, yz, zz;

@@ -26,7 +26,11 @@ namespace decant {
 /// Owen 2017, "CRKSPH" (J. Comput. Phys. 332). The force acts along the line between two particles, so linear and
 /// angular momentum are kept to rounding. Pressure p holds particles in place with the stiffness p / (rho_0 d^2), and
 /// the deeper the liquid the more jitter that makes: of a pair, nu is the mean of
-///   nu_i = max(numerical_viscosity, pressure_share d sqrt(p_i / rho_0)),   at most what an explicit sub-step stands.
+///   nu_i = max(numerical_viscosity, pressure_share d sqrt(p_i / rho_0)).
+/// Where that is more than an explicit sub-step stands it acts in several passes, each on the velocities that the one
+/// before has left, with the gradients of the first, and with what most_passes stand at most. Under pressure, each pass
+/// lets sub-steps be longer: with the share g of jitter that is left over, x'' = -w^2 x is stable to w dt = 2 in one
+/// that does not damp, and to sqrt(2 (1 + g) / g) in one that damps afterwards.
 /// It acts after the pressure. Before it, the velocities by which particles are moved would still contain what pressure
 /// has just done to them: x'' = -w^2 x is then overshot beyond w dt = sqrt(2) where friction is strong, and never after
 /// it.
@@ -38,16 +42,67 @@ struct ResidualViscosity {
 
   Scalar numerical_viscosity = Scalar(6e-4);  ///< the least nu [m^2/s], >= 0
   Scalar pressure_share = Scalar(0.2);        ///< [-], >= 0
+  int most_passes = 2;                        ///< per sub-step, >= 1
 
   template <class Step>
   void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {
     if (!(numerical_viscosity > 0) && !(pressure_share > 0)) {
       return;
     }
-    using Kernel = typename Step::Kernel;
-    using B = Batch<Scalar>;
-    note_velocities(step);
+    const int passes = note_velocities(step);
     compute_gradients(step);
+    next_.resize(velocity_.size());
+    for (int pass = 0; pass < passes; ++pass) {
+      brake(step, acceleration);
+      velocity_.swap(next_);
+    }
+  }
+
+  /// None: the viscosity gives way to the sub-step.
+  template <class Step>
+  Scalar largest_step(const Step&) const noexcept {
+    return std::numeric_limits<Scalar>::infinity();
+  }
+
+ private:
+  /// And how viscous each particle is in a pass. @return how many passes it takes.
+  template <class Step>
+  int note_velocities(const Step& step) noexcept {
+    // three quarters of what an explicit step of the pair operator stands on a lattice, see Viscosity
+    const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
+    const Scalar most = Scalar(0.75) * Scalar(0.3) / (step.time_step * stiffness);
+    velocity_.resize(4 * static_cast<std::size_t>(step.fluid.size()));
+    const Scalar wanted = largest_.over(
+        step.fluid.size(), step.threads, Scalar(0),
+        [&](Index begin, Index end) {
+          Scalar largest = 0;
+          for (Index i = begin; i < end; ++i) {
+            Scalar* const record = &velocity_[4 * static_cast<std::size_t>(i)];
+            record[0] = step.fluid.velocity(0, i);
+            record[1] = step.fluid.velocity(1, i);
+            record[2] = step.fluid.velocity(2, i);
+            const Scalar head = std::max(step.fluid.pressure[i], Scalar(0)) / step.rest_density;
+            record[3] = std::max(numerical_viscosity, pressure_share * step.spacing * std::sqrt(head));
+            largest = std::max(largest, record[3]);
+          }
+          return largest;
+        },
+        [](Scalar a, Scalar b) { return std::max(a, b); });
+    int passes = 1;
+    while (passes < most_passes && wanted > static_cast<Scalar>(passes) * most) {
+      ++passes;
+    }
+    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      Scalar& nu = velocity_[4 * static_cast<std::size_t>(i) + 3];
+      nu = std::min(most, nu / static_cast<Scalar>(passes));
+    });
+    return passes;
+  }
+
+  /// One pass: adds what it does to the velocities, and puts these as they are afterwards into next_.
+  template <class Step>
+  void brake(const Step& step, PointArray<Scalar>& acceleration) noexcept {
+    using B = Batch<Scalar>;
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(0.01) * h * h;
     const Scalar factor = 5 / step.rest_density;  // half of each one's nu
@@ -67,45 +122,25 @@ struct ResidualViscosity {
         const B residual = (velocity[0] - other.x - half * along_x) * pair.x +
                            (velocity[1] - other.y - half * along_y) * pair.y +
                            (velocity[2] - other.z - half * along_z) * pair.z;
-        const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B slope = step.pairs.slope(pair.slot);
         const B nu = velocity[3] + other.w;
         const B push = nu * other_stretch.w * residual * slope / (pair.distance_squared + softening);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
       });
-      acceleration.col(i) += factor * Vector3<Scalar>(sum(x), sum(y), sum(z));
-    });
-  }
-
-  /// None: the viscosity gives way to the sub-step.
-  template <class Step>
-  Scalar largest_step(const Step&) const noexcept {
-    return std::numeric_limits<Scalar>::infinity();
-  }
-
- private:
-  /// And how viscous each particle is.
-  template <class Step>
-  void note_velocities(const Step& step) noexcept {
-    // three quarters of what an explicit step of the pair operator stands on a lattice, see Viscosity
-    const Scalar stiffness = detail::pair_stiffness<typename Step::Kernel>(step.smoothing_length, step.spacing);
-    const Scalar most = Scalar(0.75) * Scalar(0.3) / (step.time_step * stiffness);
-    velocity_.resize(4 * static_cast<std::size_t>(step.fluid.size()));
-    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
-      Scalar* const record = &velocity_[4 * static_cast<std::size_t>(i)];
-      record[0] = step.fluid.velocity(0, i);
-      record[1] = step.fluid.velocity(1, i);
-      record[2] = step.fluid.velocity(2, i);
-      const Scalar head = std::max(step.fluid.pressure[i], Scalar(0)) / step.rest_density;
-      record[3] = std::min(most, std::max(numerical_viscosity, pressure_share * step.spacing * std::sqrt(head)));
+      const Vector3<Scalar> pull = factor * Vector3<Scalar>(sum(x), sum(y), sum(z));
+      acceleration.col(i) += pull;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        next_[own + axis] = velocity[axis] + step.time_step * pull[static_cast<Index>(axis)];
+      }
+      next_[own + 3] = velocity[3];
     });
   }
 
   /// Walls take part as liquid that moves with them along their normal.
   template <class Step>
   void compute_gradients(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     stretch_.resize(4 * static_cast<std::size_t>(count));
@@ -116,8 +151,7 @@ struct ResidualViscosity {
       const B zero(Scalar(0));
       std::array<Batch3<Scalar>, 3> rows{{{zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}}};
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope = gather(mass, pair.neighbor) *
-                        Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
+        const B slope = step.mass(pair.neighbor) * step.pairs.slope(pair.slot);
         const auto other = gather3(velocity_.data(), pair.neighbor);
         const std::array<B, 3> apart{other.x - velocity_[own], other.y - velocity_[own + 1],
                                      other.z - velocity_[own + 2]};
@@ -159,8 +193,10 @@ struct ResidualViscosity {
 
   // records of four
   std::vector<Scalar> velocity_{};  ///< and nu
+  std::vector<Scalar> next_{};      ///< likewise, after a pass
   std::vector<Scalar> stretch_{};   ///< G_xx, G_yy, G_zz and the mass
   std::vector<Scalar> shear_{};     ///< G_xy + G_yx, G_xz + G_zx, G_yz + G_zy and nothing
+  Reduction<Scalar> largest_{};
 };
 
 }  // namespace decant

@@ -3,11 +3,15 @@
 
 /// What forces and pressure solvers see of one sub-step.
 
+#include <cstdint>
+
 #include <decant/boundary/wall_state.hpp>
+#include <decant/core/batch.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/gradient_correction.hpp>
+#include <decant/force/pair_kernel.hpp>
 
 namespace decant {
 
@@ -20,7 +24,8 @@ struct StepView {
   using Scalar = typename Kernel::Scalar;
 
   FluidState<Scalar>& fluid;
-  const Neighbors& neighbors;  ///< pairs within the support radius, without those that a wall separates
+  const Neighbors& neighbors;       ///< pairs within the support radius, without those that a wall separates
+  const PairKernel<Scalar>& pairs;  ///< the kernel at each of them
   const WallState<Scalar>& walls;
   const GradientCorrection<Scalar>& correction;  ///< empty unless a part has `uses_gradient_correction = true`
   Growable<Scalar, 3>& shift;   ///< 3xN, moved at the end of the sub-step beside time_step * velocity [m]; zero at
@@ -31,6 +36,11 @@ struct StepView {
   Scalar time_step = 0;         ///< [s]; 0 before it has been chosen
   double time = 0;              ///< [s]
   Threads threads{};
+
+  /// Of a batch of particles, by their numbers [kg].
+  [[gnu::always_inline]] Batch<Scalar> mass(const std::uint32_t* numbers) const noexcept {
+    return pairs.common_mass() > 0 ? Batch<Scalar>(pairs.common_mass()) : gather(fluid.mass.data(), numbers);
+  }
 };
 
 }  // namespace decant

@@ -75,11 +75,9 @@ struct SurfaceTension {
   /// Stores n / sqrt|n|, so that squares of it carry the weight |n|.
   template <class Step>
   void find_normals(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     const Scalar h = step.smoothing_length;
-    const Scalar* mass = step.fluid.mass.data();
     // 0.1 / h is a fifth of the length at a flat surface and above the noise inside a liquid at rest
     const Scalar noise = Scalar(0.01) / (h * h);
     root_.resize(4 * static_cast<std::size_t>(count));
@@ -87,8 +85,7 @@ struct SurfaceTension {
     parallel_for(count, step.threads, [&](Index i) {
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope =
-            gather(mass, pair.neighbor) * Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B slope = step.mass(pair.neighbor) * step.pairs.slope(pair.slot);
         x = multiply_add(slope, pair.x, x);
         y = multiply_add(slope, pair.y, y);
         z = multiply_add(slope, pair.z, z);
@@ -109,7 +106,6 @@ struct SurfaceTension {
 
   template <class Step>
   void pull(const Step& step, PointArray<Scalar>& acceleration) const noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(1e-4) * h * h;
@@ -128,8 +124,7 @@ struct SurfaceTension {
         const B weight = own[3] + n.w;
         const B ratio = (across_i * across_i + across_j * across_j - damping * weight * approach) /
                         (pair.distance_squared + softening);
-        const B push = other.w * Kernel::derivative_over_radius(square_root(pair.distance_squared), h) *
-                       (cohesion * weight - ratio);
+        const B push = other.w * step.pairs.slope(pair.slot) * (cohesion * weight - ratio);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);

@@ -57,7 +57,6 @@ struct Viscosity {
     });
     const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length);
     const Scalar factor = -kinematic_viscosity / step.rest_density;
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(count, step.threads, [&](Index i) {
       const Scalar* own = &velocity_[static_cast<std::size_t>(4 * i)];
       const B own_x(own[0]), own_y(own[1]), own_z(own[2]);
@@ -65,7 +64,7 @@ struct Viscosity {
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
         const auto other = gather3(velocity_.data(), pair.neighbor);
         const B approach = (own_x - other.x) * pair.x + (own_y - other.y) * pair.y + (own_z - other.z) * pair.z;
-        const B push = gather(mass, pair.neighbor) * approach * weight(pair.distance_squared);
+        const B push = step.mass(pair.neighbor) * approach * weight(pair.distance_squared);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);

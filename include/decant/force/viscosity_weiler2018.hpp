@@ -117,7 +117,6 @@ struct ViscosityWeiler2018 {
     const Index count = step.fluid.size();
     const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length);
     const Scalar factor = kinematic_viscosity * step.time_step / step.rest_density;
-    const Scalar* mass = step.fluid.mass.data();
     if (weight_.size() < step.neighbors.index_size()) {
       weight_.resize(step.neighbors.index_size());
     }
@@ -127,7 +126,7 @@ struct ViscosityWeiler2018 {
     image_.set_count(count);
     parallel_for(count, step.threads, [&](Index i) {
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B shared = factor * gather(mass, pair.neighbor) * weight(pair.distance_squared);
+        const B shared = factor * step.mass(pair.neighbor) * weight(pair.distance_squared);
         shared.store(&weight_[pair.slot]);
       });
     });

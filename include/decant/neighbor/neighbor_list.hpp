@@ -23,9 +23,11 @@
 namespace decant {
 
 /// One row per particle, neighbours in ascending order, filled up to whole batches with the particle's own index: there
-/// x_i - x_j is zero, so antisymmetric pair terms vanish and others are masked. Keeps a copy of the positions, so pair
-/// sweeps need nothing else. Rows are the same for any number of threads and any instruction set. Building allocates
-/// only while the number of particles or of neighbours grows; sweeps never do, and may run in many threads at once.
+/// x_i - x_j is zero, so antisymmetric pair terms vanish and others are masked. Separations are written down beside the
+/// neighbours: there are about ten sweeps over the pairs in a sub-step beside those of the pressure, and to gather
+/// positions from all over took most of the time of each. Rows are the same for any number of threads and any
+/// instruction set. Building allocates only while the number of particles or of neighbours grows; sweeps never do, and
+/// may run in many threads at once.
 template <std::floating_point ScalarType, class DomainType = OpenDomain>
 class NeighborList {
  public:
@@ -89,12 +91,9 @@ class NeighborList {
   /// Calls f(Index j, Vector3<Scalar> x_i - x_j [m], Scalar r_squared [m^2]) for each neighbour j of i, ascending.
   template <class Function>
   void for_each(Index i, Function&& f) const noexcept {
-    const Scalar* const own = records_.data() + 4 * i;
     const Row row = rows_[static_cast<std::size_t>(i)];
     for (std::size_t k = row.first; k < row.first + row.count; ++k) {
-      const Scalar* const other = records_.data() + 4 * static_cast<std::size_t>(index_[k]);
-      const Vector3<Scalar> between(domain_.separation(0, own[0], other[0]), domain_.separation(1, own[1], other[1]),
-                                    domain_.separation(2, own[2], other[2]));
+      const Vector3<Scalar> between(x_[k], y_[k], z_[k]);
       f(static_cast<Index>(index_[k]), between, squared_length(between[0], between[1], between[2]));
     }
   }
@@ -102,17 +101,14 @@ class NeighborList {
   /// Calls f(Pairs) for each batch of neighbours of i: all of a row in ceil(count / width) calls.
   template <class Function>
   [[gnu::always_inline]] void for_each_batch(Index i, Function&& f) const noexcept {
-    const Scalar* const own = records_.data() + 4 * i;
-    const Number own_x(own[0]), own_y(own[1]), own_z(own[2]);
     const Row row = rows_[static_cast<std::size_t>(i)];
     for (std::size_t k = 0; k < row.count; k += Number::width) {
       Pairs pairs;
       pairs.slot = row.first + k;
       pairs.neighbor = index_.data() + pairs.slot;
-      const Batch3<Scalar> other = gather3(records_.data(), pairs.neighbor);
-      pairs.x = domain_.separation(0, own_x, other.x);
-      pairs.y = domain_.separation(1, own_y, other.y);
-      pairs.z = domain_.separation(2, own_z, other.z);
+      pairs.x = Number::load(x_.data() + pairs.slot);
+      pairs.y = Number::load(y_.data() + pairs.slot);
+      pairs.z = Number::load(z_.data() + pairs.slot);
       pairs.distance_squared = squared_length(pairs.x, pairs.y, pairs.z);
       pairs.valid = Number::Mask::first(row.count - k);
       f(pairs);
@@ -135,18 +131,19 @@ class NeighborList {
         return;
       }
       Row& row = rows_[static_cast<std::size_t>(i)];
-      std::uint32_t* const begin = index_.data() + row.first;
-      std::uint32_t* const end = begin + row.count;
-      const Vector3<Scalar> x = position(i);
-      std::uint32_t* const kept = std::remove_if(begin, end, [&](std::uint32_t neighbor) {
-        const auto j = static_cast<Index>(neighbor);
-        const Vector3<Scalar> y = position(j);
-        return predicate(i, j,
-                         Vector3<Scalar>(domain_.separation(0, x[0], y[0]), domain_.separation(1, x[1], y[1]),
-                                         domain_.separation(2, x[2], y[2])));
-      });
-      std::fill(kept, end, static_cast<std::uint32_t>(i));
-      row.count = static_cast<std::uint32_t>(kept - begin);
+      std::size_t kept = row.first;
+      for (std::size_t k = row.first; k < row.first + row.count; ++k) {
+        if (predicate(i, static_cast<Index>(index_[k]), Vector3<Scalar>(x_[k], y_[k], z_[k]))) {
+          continue;
+        }
+        index_[kept] = index_[k];
+        x_[kept] = x_[k];
+        y_[kept] = y_[k];
+        z_[kept] = z_[k];
+        ++kept;
+      }
+      rows_at(0).pad(static_cast<std::uint32_t>(i), kept, row.first + row.count);
+      row.count = static_cast<std::uint32_t>(kept - row.first);
     });
   }
 
@@ -191,10 +188,31 @@ class NeighborList {
     }
   };
 
+  // Where a row is written.
+  struct Place {
+    std::uint32_t* index;
+    Scalar *x, *y, *z;
+
+    Place at(std::size_t k) const noexcept { return {index + k, x + k, y + k, z + k}; }
+
+    // Entries for which nothing is to be found: particle i itself.
+    void pad(std::uint32_t i, std::size_t begin, std::size_t end) const noexcept {
+      for (std::size_t k = begin; k < end; ++k) {
+        index[k] = i;
+        x[k] = y[k] = z[k] = 0;
+      }
+    }
+  };
+
+  // All rows, from a place on.
+  Place rows_at(std::size_t slot) noexcept { return Place{index_.data(), x_.data(), y_.data(), z_.data()}.at(slot); }
+
   // Where a thread keeps the candidates of one cell, and a row that does not fit.
   struct Workspace {
-    Candidates found, sorted;
-    detail::Scratch<std::uint32_t> rank, from, spilled;
+    Candidates found, sorted, spilled;
+    detail::Scratch<std::uint32_t> rank, from;
+
+    Place beside() noexcept { return {spilled.number.data(), spilled.x.data(), spilled.y.data(), spilled.z.data()}; }
 
     void require(std::size_t count) {
       const std::size_t room = count + 4 * row_step;  // batches are written whole
@@ -238,26 +256,28 @@ class NeighborList {
 
   // Appends rows to one chunk; keeps count of what they would need when they do not fit.
   struct Chunk {
-    std::uint32_t* const index;
+    const Place all;
     Row* const rows;
     const std::size_t end;
     std::size_t next;
     bool fits = true;
 
     // Where the row may be written, if it needs no more than `room` entries, or else `elsewhere`.
-    std::uint32_t* place(std::size_t room, std::uint32_t* elsewhere) const noexcept {
-      return fits && next + room <= end ? index + next : elsewhere;
+    Place place(std::size_t room, const Place& elsewhere) const noexcept {
+      return fits && next + room <= end ? all.at(next) : elsewhere;
     }
-    void close(std::uint32_t i, std::uint32_t* row, std::size_t count) noexcept {
+    void close(std::uint32_t i, const Place& row, std::size_t count) noexcept {
       const std::size_t padded = round_up(count, row_step);
       fits = fits && next + padded <= end;
       if (fits) {
-        if (row != index + next) {
-          std::copy_n(row, count, index + next);
+        const Place own = all.at(next);
+        if (row.index != own.index) {
+          std::copy_n(row.index, count, own.index);
+          std::copy_n(row.x, count, own.x);
+          std::copy_n(row.y, count, own.y);
+          std::copy_n(row.z, count, own.z);
         }
-        for (std::size_t k = count; k < padded; ++k) {
-          index[next + k] = i;
-        }
+        own.pad(i, count, padded);
         rows[i] = {static_cast<std::uint32_t>(next), static_cast<std::uint32_t>(count)};
       }
       next += padded;
@@ -277,12 +297,17 @@ class NeighborList {
     }
     needed_.assign(chunks(), 0);
     expects(index_size() < (std::size_t{1} << 32), "NeighborList: entries", "below 2^32", index_size());
-    index_.require(index_size() + row_step);
-    const Index grain = static_cast<Index>((chunks() + workers - 1) / workers);
-    parallel_ranges(static_cast<Index>(chunks()), threads, std::max<Index>(1, grain), [&](Index begin, Index end) {
-      Workspace& workspace = workspaces_[static_cast<std::size_t>(begin / grain)];
-      for (std::size_t c = static_cast<std::size_t>(begin); c < static_cast<std::size_t>(end); ++c) {
-        Chunk chunk{index_.data(), rows_.data(), (c + 1) * chunk_room_, c * chunk_room_};
+    const std::size_t room = index_size() + row_step;
+    index_.require(room);
+    for (auto* values : {&x_, &y_, &z_}) {
+      values->require(room);
+    }
+    const std::size_t share = (chunks() + workers - 1) / workers;
+    parallel_ranges(static_cast<Index>(workers), threads, 1, [&](Index worker, Index) {
+      Workspace& workspace = workspaces_[static_cast<std::size_t>(worker)];
+      const std::size_t first = static_cast<std::size_t>(worker) * share;
+      for (std::size_t c = first; c < std::min(chunks(), first + share); ++c) {
+        Chunk chunk{rows_at(0), rows_.data(), (c + 1) * chunk_room_, c * chunk_room_};
         write_chunk(search, c * chunk_size, std::min(count_, (c + 1) * chunk_size), workspace, chunk);
         needed_[c] = chunk.next - c * chunk_room_;
       }
@@ -340,11 +365,19 @@ class NeighborList {
   template <class Search>
   void write_chunk(const Search& search, std::size_t begin, std::size_t end, Workspace& workspace,
                    Chunk& chunk) const noexcept {
-    std::uint32_t* const row = workspace.spilled.data();
+    const Place row = workspace.beside();
     for (std::size_t i = begin; i < end; ++i) {
       std::size_t count = 0;
-      search.for_each(static_cast<Index>(i), [&](Index j, Scalar) { row[count++] = static_cast<std::uint32_t>(j); });
-      std::sort(row, row + count);
+      search.for_each(static_cast<Index>(i),
+                      [&](Index j, Scalar) { row.index[count++] = static_cast<std::uint32_t>(j); });
+      std::sort(row.index, row.index + count);
+      const Vector3<Scalar> own = position(static_cast<Index>(i));
+      for (std::size_t k = 0; k < count; ++k) {
+        const Vector3<Scalar> other = position(static_cast<Index>(row.index[k]));
+        row.x[k] = domain_.separation(0, own[0], other[0]);
+        row.y[k] = domain_.separation(1, own[1], other[1]);
+        row.z[k] = domain_.separation(2, own[2], other[2]);
+      }
       chunk.close(static_cast<std::uint32_t>(i), row, count);
     }
   }
@@ -396,23 +429,26 @@ class NeighborList {
       const std::uint32_t* const near_number = near.number.data();
 
       for (std::size_t i = from; i < to; ++i, ++self) {
-        std::uint32_t* const row = chunk.place(count + row_step, workspace.spilled.data());
+        const Place row = chunk.place(count + row_step, workspace.beside());
         const std::size_t own = in_order ? self : workspace.rank[self];
         const Number own_x(x[i]), own_y(y[i]), own_z(z[i]);
         std::size_t length = 0;
         for (std::size_t k = 0; k < count; k += Number::width) {
-          std::uint32_t bits = (squared_length(domain_.separation(0, own_x, Number::load(near_x + k)),
-                                               domain_.separation(1, own_y, Number::load(near_y + k)),
-                                               domain_.separation(2, own_z, Number::load(near_z + k))) < limit)
-                                   .bits();
+          const Number x_between = domain_.separation(0, own_x, Number::load(near_x + k)),
+                       y_between = domain_.separation(1, own_y, Number::load(near_y + k)),
+                       z_between = domain_.separation(2, own_z, Number::load(near_z + k));
+          std::uint32_t bits = (squared_length(x_between, y_between, z_between) < limit).bits();
           bits &= own - k < Number::width ? ~(1u << (own - k)) : ~0u;
-          length += detail::compress_bits<Scalar>(row + length, near_number + k, bits);
+          detail::compress_bits(row.x + length, x_between, bits);
+          detail::compress_bits(row.y + length, y_between, bits);
+          detail::compress_bits(row.z + length, z_between, bits);
+          length += detail::compress_bits<Scalar>(row.index + length, near_number + k, bits);
         }
         chunk.close(in_order ? static_cast<std::uint32_t>(i) : order[i], row, length);
       }
     });
     for (std::size_t k = std::max(begin, std::min(end, grid.placed())); k < end; ++k) {
-      chunk.close(order[k], workspace.spilled.data(), 0);  // not finite: no neighbours
+      chunk.close(order[k], workspace.beside(), 0);  // not finite: no neighbours
     }
   }
 
@@ -421,6 +457,7 @@ class NeighborList {
   std::size_t chunk_room_ = 48 * chunk_size;  // a resting liquid has about 30 neighbours within two spacings
   detail::Scratch<Row> rows_;
   detail::Scratch<std::uint32_t> index_;
+  detail::Scratch<Scalar> x_, y_, z_;  ///< x_i - x_j in the order of index_ [m]
   detail::Scratch<Scalar> records_;
   std::vector<Workspace> workspaces_;
   std::vector<std::size_t> needed_;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -13,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/pressure_system.hpp>
@@ -25,7 +27,8 @@ namespace decant {
 ///   z = Z (Z^T A Z)^-1 Z^T r
 /// which is the coarse half of a two-level preconditioner (deflation: Nicolaides 1987, SIAM J. Numer. Anal. 24). Z^T A
 /// Z is the exact product, summed from what each particle feels of its cells, and factorized within its profile; there
-/// are at most some two thousand cells, which are made larger for more liquid.
+/// are at most some two thousand cells, which are made larger for more liquid. Cells stand still in space, so the
+/// matrix of a few sub-steps ago will do: liquid has moved little, and what has come into new cells waits.
 template <class ScalarType>
 class CoarseCells {
  public:
@@ -35,7 +38,12 @@ class CoarseCells {
   template <class Step>
   void sort(const Step& step) {
     const auto count = static_cast<std::size_t>(step.fluid.size());
+    const Scalar width_before = layout_.width;
     number_cells(step);
+    if (layout_.width != width_before) {
+      forget();
+    }
+    find_in_matrix();
     begin_.assign(keys_.size() + 1, 0);
     cell_.resize(count);
     slot_.resize(count);
@@ -83,57 +91,77 @@ class CoarseCells {
     return sum;
   }
 
+  /// Forgets the matrix.
+  void forget() noexcept { matrix_keys_.clear(); }
+
+  /// Whether there is a matrix for cells like these.
+  bool assembled() const noexcept { return !matrix_keys_.empty(); }
+
   /// Computes and factorizes Z^T A Z. After sort().
   template <class Step>
   void assemble(const Step& step, const PressureSystem<Scalar>& system, const std::vector<Scalar>& contact) {
     felt_.resize(cell_.size());
+    part_of_.resize(cell_.size());
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
-      Felt& felt = felt_[static_cast<std::size_t>(i)];
-      felt = Felt{};
-      system.for_each_response(step.neighbors, i, [&](std::size_t j, Scalar x, Scalar y, Scalar z) {
-        const Index slot = slot_[j];
-        felt.cell[static_cast<std::size_t>(slot)] = cell_[j];
-        felt.part(slot, 0) += contact[j] * x;
-        felt.part(slot, 1) += contact[j] * y;
-        felt.part(slot, 2) += contact[j] * z;
-      });
+      const auto own = static_cast<std::size_t>(i);
+      part_of_[own] = static_cast<Scalar>(contact[own] > 0 ? slot_[own] : slots);
     });
+    parallel_for(step.fluid.size(), step.threads,
+                 [&](Index i) { feel(step.neighbors, system, i, felt_[static_cast<std::size_t>(i)]); });
     find_groups();
     lay_out_profile();
-    const double squared_step = static_cast<double>(step.time_step) * static_cast<double>(step.time_step);
-    std::size_t i = 0;
-    for (const Group& group : groups_) {
-      Products gathered = Products::Zero();
-      for (; i < group.end; ++i) {
-        gathered.noalias() += felt_[i].part.lazyProduct(felt_[i].part.transpose());
+    products_.resize(groups_.size());
+    const Index groups_per_range = 64;
+    parallel_ranges(static_cast<Index>(groups_.size()), step.threads, groups_per_range, [&](Index begin, Index end) {
+      for (auto g = static_cast<std::size_t>(begin); g < static_cast<std::size_t>(end); ++g) {
+        Products gathered = Products::Zero();
+        for (std::size_t i = g == 0 ? 0 : groups_[g - 1].end; i < groups_[g].end; ++i) {
+          gathered.noalias() += felt_[i].part.lazyProduct(felt_[i].part.transpose());
+        }
+        products_[g] = gathered;
       }
+    });
+    for (std::size_t g = 0; g < groups_.size(); ++g) {
+      const auto& cell = groups_[g].cell;
       for (std::size_t k = 0; k < slots; ++k) {
-        for (std::size_t l = 0; l < slots && group.cell[k] != none; ++l) {
-          if (group.cell[l] <= group.cell[k]) {
-            entry(group.cell[k], group.cell[l]) +=
-                squared_step * static_cast<double>(gathered(static_cast<Index>(k), static_cast<Index>(l)));
+        for (std::size_t l = 0; l < slots && cell[k] != none; ++l) {
+          if (cell[l] <= cell[k]) {
+            entry(cell[k], cell[l]) += static_cast<double>(products_[g](static_cast<Index>(k), static_cast<Index>(l)));
           }
         }
       }
     }
     factorize();
+    matrix_keys_ = keys_;
+    find_in_matrix();
   }
 
-  /// Replaces what restrict() took by z, see correction(). After assemble().
-  void solve() noexcept {
-    const std::size_t cells = keys_.size();
-    for (std::size_t a = 0; a < cells; ++a) {
-      double value = value_[a];
-      for (std::size_t b = first_[a]; b < a; ++b) {
-        value -= entry(a, b) * value_[b];
+  /// Replaces what restrict() took by z, see correction(); 0 in cells that assemble() has not seen.
+  /// @param time_step [s].
+  void solve(Scalar time_step) noexcept {
+    const std::size_t cells = matrix_keys_.size();
+    solution_.assign(cells, 0.0);
+    for (std::size_t c = 0; c < keys_.size(); ++c) {
+      if (place_[c] != none) {
+        solution_[place_[c]] = value_[c];
       }
-      value_[a] = value * entry(a, a);
+    }
+    for (std::size_t a = 0; a < cells; ++a) {
+      double value = solution_[a];
+      for (std::size_t b = first_[a]; b < a; ++b) {
+        value -= entry(a, b) * solution_[b];
+      }
+      solution_[a] = value * entry(a, a);
     }
     for (std::size_t a = cells; a-- > 0;) {
-      value_[a] *= entry(a, a);
+      solution_[a] *= entry(a, a);
       for (std::size_t b = first_[a]; b < a; ++b) {
-        value_[b] -= entry(a, b) * value_[a];
+        solution_[b] -= entry(a, b) * solution_[a];
       }
+    }
+    const double squared_step = static_cast<double>(time_step) * static_cast<double>(time_step);
+    for (std::size_t c = 0; c < keys_.size(); ++c) {
+      value_[c] = place_[c] != none ? solution_[place_[c]] / squared_step : 0;
     }
   }
 
@@ -157,6 +185,41 @@ class CoarseCells {
     std::array<std::uint32_t, slots> cell{none, none, none, none, none, none, none, none};
     Parts part = Parts::Zero();
   };
+
+  template <class Neighbors>
+  void feel(const Neighbors& list, const PressureSystem<Scalar>& system, Index i, Felt& felt) const noexcept {
+    using B = Batch<Scalar>;
+    const auto own = static_cast<std::size_t>(i);
+    felt = Felt{};
+    std::array<Batch3<Scalar>, slots> sums;
+    system.for_each_response(list, i, [&](const std::uint32_t* neighbor, B x, B y, B z) {
+      const B part = gather(part_of_.data(), neighbor);
+      for (std::size_t slot = 0; slot < slots; ++slot) {
+        const auto in_slot = part == B(static_cast<Scalar>(slot));
+        const std::uint32_t lanes = in_slot.bits();
+        if (lanes == 0) {
+          continue;
+        }
+        const B zero(Scalar(0));
+        if (felt.cell[slot] == none) {
+          felt.cell[slot] = cell_[neighbor[std::countr_zero(lanes)]];
+          sums[slot] = {zero, zero, zero};
+        }
+        sums[slot].x += select(in_slot, x, zero);
+        sums[slot].y += select(in_slot, y, zero);
+        sums[slot].z += select(in_slot, z, zero);
+      }
+    });
+    for (std::size_t slot = 0; slot < slots; ++slot) {
+      if (felt.cell[slot] != none) {
+        felt.part.row(static_cast<Index>(slot)) << sum(sums[slot].x), sum(sums[slot].y), sum(sums[slot].z);
+      }
+    }
+    if (const std::size_t slot = slot_[own]; part_of_[own] < static_cast<Scalar>(slots)) {
+      felt.cell[slot] = cell_[own];
+      felt.part.row(static_cast<Index>(slot)) += Eigen::Map<const Eigen::Matrix<Scalar, 1, 3>>(system.own_response(i));
+    }
+  }
 
   /// Particles that follow each other in the list and feel the same cells, or no others: what they add to the matrix is
   /// gathered before it goes there.
@@ -193,17 +256,20 @@ class CoarseCells {
   void number_cells(const Step& step) {
     const auto& position = step.fluid.position;
     const Index count = step.fluid.size();
-    const Vector3<Scalar> low = position.rowwise().minCoeff();
-    const Vector3<Scalar> extent = position.rowwise().maxCoeff() - low;
-    // the longest axis counts most: cells that touch then have numbers close to each other, and the profile is small
-    std::array<Index, 3> axis{0, 1, 2};
-    std::sort(axis.begin(), axis.end(), [&](Index a, Index b) { return extent[a] > extent[b]; });
+    const Vector3<Scalar> extent = position.rowwise().maxCoeff() - position.rowwise().minCoeff();
+    std::array<Index, 3>& axis = layout_.axis;
+    if (!assembled()) {
+      // the longest axis counts most: cells that touch then have numbers close to each other, and the profile is small
+      axis = {0, 1, 2};
+      std::sort(axis.begin(), axis.end(), [&](Index a, Index b) { return extent[a] > extent[b]; });
+    }
     key_.resize(static_cast<std::size_t>(count));
-    Scalar width = cell_width * static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length;
+    layout_.width = cell_width * static_cast<Scalar>(Step::Kernel::support_factor) * step.smoothing_length;
     while (true) {
+      constexpr Scalar middle = Scalar(1 << 20), most = Scalar((1 << 21) - 1);  // also for what is not a number
+      const Scalar per_width = 1 / layout_.width;
       const auto along = [&](Index a, Index i) {
-        const Scalar place = (position(a, i) - low[a]) / width;
-        constexpr auto most = Scalar(1 << 20);  // also for what is not a number
+        const Scalar place = std::floor(position(a, i) * per_width) + middle;
         return place > 0 ? static_cast<std::uint64_t>(std::min(place, most)) : std::uint64_t{0};
       };
       keys_.clear();
@@ -219,7 +285,20 @@ class CoarseCells {
       if (keys_.size() <= most_cells) {
         return;
       }
-      width *= 2;
+      layout_.width *= 2;
+    }
+  }
+
+  /// Which rows of the matrix belong to the cells that there are now.
+  void find_in_matrix() {
+    place_.resize(keys_.size());
+    std::size_t row = 0;
+    for (std::size_t c = 0; c < keys_.size(); ++c) {
+      while (row < matrix_keys_.size() && matrix_keys_[row] < keys_[c]) {
+        ++row;
+      }
+      const bool found = row < matrix_keys_.size() && matrix_keys_[row] == keys_[c];
+      place_[c] = found ? static_cast<std::uint32_t>(row) : none;
     }
   }
 
@@ -268,15 +347,26 @@ class CoarseCells {
     }
   }
 
+  /// What keys mean.
+  struct Layout {
+    std::array<Index, 3> axis{0, 1, 2};  ///< which counts most, which least
+    Scalar width = 0;                    ///< of cells [m]
+  };
+
+  Layout layout_{};
   std::vector<std::uint64_t> keys_{}, key_{};                 ///< of all cells, in order; of each particle's
+  std::vector<std::uint64_t> matrix_keys_{};                  ///< of the cells that the matrix is about
+  std::vector<std::uint32_t> place_{};                        ///< in the matrix, of each cell; or none
   std::vector<std::uint32_t> cell_{};                         ///< of each particle
   std::vector<std::uint8_t> slot_{};                          ///< of its cell, see Felt
   std::vector<std::uint32_t> begin_{}, member_{}, cursor_{};  ///< the particles of each cell
+  std::vector<Scalar> part_of_{};                             ///< slot_ of particles in contact, else `slots`
   std::vector<Felt> felt_{};
+  std::vector<Products, Eigen::aligned_allocator<Products>> products_{};  ///< of each group
   std::vector<Group> groups_{};
   std::vector<std::uint32_t> first_{};
   std::vector<std::size_t> row_{};  ///< where column 0 of each row would be
-  std::vector<double> matrix_{}, value_{};
+  std::vector<double> matrix_{}, solution_{}, value_{};
 };
 
 }  // namespace decant

@@ -35,13 +35,23 @@ class ComplementaritySolver {
 
   double mean_tolerance = 1e-3;     ///< mean of what may be left amiss, over rest density [-], > 0
   double largest_tolerance = 3e-3;  ///< for any one particle [-], > 0
-  /// Of mean_tolerance, for what cells of particles are compressed as a whole: what is left in a region adds up over
-  /// its depth, and eighty layers that each give way by 1e-4 a sub-step fall through themselves.
-  double net_share = 0.3;
+  /// Mean of what cells of particles may be amiss by as a whole, over rest density, > 0. What is left in a region adds
+  /// up over its depth and from one sub-step to the next: eighty layers that each give way by 1e-4 fall through
+  /// themselves, while particles that are amiss by ten times as much, some too dense and some too loose, do not.
+  double net_tolerance = 3e-4;
+  /// How long the matrix of CoarseCells serves, >= 1: it costs as much as three iterations, and the older it is the
+  /// more steps it takes.
+  int sub_steps_per_matrix = 1;
   int most_iterations = 100;  ///< >= 1
 
+  /// Forgets all that earlier frames have left: what a frame comes to depends on its state alone.
+  void begin_frame() noexcept { cells_.forget(); }
+
   /// Forgets the places of particles; call once per sub-step, before the first solve.
-  void begin_step() noexcept { sorted_ = assembled_ = false; }
+  void begin_step() noexcept {
+    sorted_ = false;
+    ++age_;
+  }
 
   /// @param offset N, [kg/m^3]. @param term N, P: start and result. Leaves the matching accelerations in the system.
   /// What is amiss at a particle: compression that is left, or pressure that pushes liquid apart (as far as it does).
@@ -69,13 +79,16 @@ class ComplementaritySolver {
     const double rest_density = static_cast<double>(step.rest_density);
     const double allowed = mean_tolerance * rest_density * static_cast<double>(count);
     const double largest_allowed = largest_tolerance * rest_density;
+    const double net_allowed = net_tolerance * rest_density * static_cast<double>(count);
     const Scalar steep = step.time_step * step.rest_density / step.spacing;
     smallest_slope_ = Scalar(1e-6) * steep * steep;
+    bool particles_done = false;
+    int steps_by_cells = 0;
     const auto judge = [&](const Progress& progress) {
       report.error = progress.amiss / (rest_density * static_cast<double>(count));
       net_ = cells_.restrict(residual_, contact_, step.threads);
-      report.converged =
-          progress.amiss <= allowed && progress.largest <= largest_allowed && net_ <= net_share * allowed;
+      particles_done = progress.amiss <= allowed && progress.largest <= largest_allowed;
+      report.converged = particles_done && net_ <= net_allowed;
       return report.converged;
     };
     while (true) {
@@ -84,12 +97,13 @@ class ComplementaritySolver {
       if (judge(start) || report.iterations >= most_iterations) {
         return report;
       }
-      const bool in_bulk = net_ > net_share * allowed;
-      if (in_bulk && !assembled_) {
+      const bool in_bulk = net_ > net_allowed;
+      if (in_bulk && (age_ >= sub_steps_per_matrix || !cells_.assembled())) {
         cells_.assemble(step, system, contact_);
-        assembled_ = true;
+        age_ = 0;
       }
-      double product = precondition(step, system, squared_step, in_bulk);
+      Scope scope = in_bulk ? Scope::Both : Scope::Particles;
+      double product = precondition(step, system, squared_step, scope);
       direction_.swap(image_);
       for (int since_start = 1;; ++since_start) {
         const double curvature = apply(step, system, squared_step);
@@ -113,8 +127,17 @@ class ComplementaritySolver {
         if ((now.negative || now.touched) && since_start >= steps_between_starts) {
           break;
         }
-        const double next_product = precondition(step, system, squared_step, in_bulk);
-        const Scalar keep = static_cast<Scalar>(next_product / product);
+        // When only whole regions are still amiss, a step by cells alone settles them; particles have no say in it, and
+        // what they ask for would take it seven more. Where it does not, the matrix is not that of these cells.
+        const bool was_whole = scope == Scope::Cells;
+        if (in_bulk) {
+          const bool whole = particles_done && !was_whole && steps_by_cells < most_steps_by_cells;
+          scope = whole ? Scope::Cells : Scope::Both;
+          steps_by_cells += whole ? 1 : 0;
+        }
+        const double next_product = precondition(step, system, squared_step, scope);
+        const bool goes_on = !was_whole && scope != Scope::Cells;
+        const Scalar keep = goes_on ? static_cast<Scalar>(next_product / product) : Scalar(0);
         product = next_product;
         parallel_for(count, step.threads, [&](Index i) {
           const auto own = static_cast<std::size_t>(i);
@@ -126,6 +149,10 @@ class ComplementaritySolver {
 
  private:
   static constexpr int steps_between_starts = 6;
+  static constexpr int most_steps_by_cells = 8;  ///< per solve
+
+  /// Whose residuals a direction answers to.
+  enum class Scope { Particles, Cells, Both };
 
   struct Progress {
     double amiss = 0;       ///< sum over particles [kg/m^3]
@@ -160,15 +187,15 @@ class ComplementaritySolver {
   /// Puts into image_ what residual_ asks for, over the contacts. Returns residual . image.
   template <class Step>
   double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step,
-                      bool in_bulk) noexcept {
-    if (in_bulk) {
-      cells_.solve();
+                      Scope scope) noexcept {
+    if (scope != Scope::Particles) {
+      cells_.solve(step.time_step);
     }
     return sum_over(step, [&](std::size_t own) {
       const Scalar slope = squared_step * system.diagonal()[own];
       // what is not in contact may have no slope to divide by
-      const Scalar alone = contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
-      image_[own] = contact_[own] * (in_bulk ? alone + cells_.correction(own) : alone);
+      const Scalar alone = scope != Scope::Cells && contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
+      image_[own] = contact_[own] * (scope != Scope::Particles ? alone + cells_.correction(own) : alone);
       return static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
     });
   }
@@ -237,7 +264,7 @@ class ComplementaritySolver {
             const auto own = static_cast<std::size_t>(i);
             term[own] += along * direction_[own];
             residual_[own] -= along * image_[own];
-            for (std::size_t axis = 0; axis < 4; ++axis) {
+            for (std::size_t axis = 0; axis < 3; ++axis) {
               sum_[4 * own + axis] += along * system.accelerations()[4 * own + axis];
             }
             const Scalar left = residual_[own], slope = squared_step * system.diagonal()[own];
@@ -255,11 +282,12 @@ class ComplementaritySolver {
 
   Scalar smallest_slope_ = 0;
   CoarseCells<Scalar> cells_{};
-  bool sorted_ = false, assembled_ = false;
+  bool sorted_ = false;
+  int age_ = 0;     ///< of the cells' matrix, in sub-steps
   double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0
-  std::vector<Scalar> sum_{};      ///< accelerations by `term`, records of four
+  std::vector<Scalar> sum_{};      ///< accelerations by `term`, records as the system's
   Reduction<Progress> reduction_{};
   Reduction<double> reduction_of_sums_{};
 };

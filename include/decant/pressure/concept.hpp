@@ -21,6 +21,8 @@ struct PressureReport {
 };
 
 /// Keeps the liquid incompressible. A plain value with settings, and scratch memory of its own.
+/// begin_frame(), which a solver need not have: a frame begins, and all but memory() has to be forgotten, so that frames
+/// come out the same from the same state.
 /// begin_step(step, report): called when neighbours, walls and densities of a sub-step are there; may change
 /// velocities.
 /// solve(step, report): called when all other forces have been added to the velocities; adds those of pressure and may

@@ -44,7 +44,7 @@ class Dfsph {
                                                ///< looser, still water keeps falling through itself by what is allowed
   Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
   int most_iterations = 200;                   ///< of each solve, per sub-step
-  Scalar tolerance_factor = Scalar(1);         ///< of all tolerances [-], > 0
+  Scalar tolerance_factor = Scalar(1);         ///< of what single particles may be amiss by [-], > 0
   Scalar stability_number = Scalar(0.3);       ///< see largest_stable_step [-], > 0
 
   /// What is carried from step to step, to start the next solve from.
@@ -83,6 +83,8 @@ class Dfsph {
     return largest_stable_step(step, mean, static_cast<double>(tolerance_factor * density_tolerance),
                                static_cast<double>(stability_number));
   }
+
+  void begin_frame() noexcept { complementarity_.begin_frame(); }
 
   template <class Step>
   void begin_step(const Step& step, PressureReport&) noexcept {
@@ -160,6 +162,7 @@ class Dfsph {
   /// far that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
   static constexpr Scalar collision_threshold = Scalar(0.02), collision_tolerance = Scalar(0.01);
   static constexpr Scalar closing_time = Scalar(0.05);  ///< [s]
+  static constexpr Scalar net_share = Scalar(0.3);      ///< of the mean tolerances, for cells of particles
 
   void resize(Index count) {
     const auto n = static_cast<std::size_t>(count);
@@ -220,7 +223,7 @@ class Dfsph {
       record[0] = step.fluid.velocity(0, i);
       record[1] = step.fluid.velocity(1, i);
       record[2] = step.fluid.velocity(2, i);
-      record[3] = 0;
+      record[3] = place_system_.weights()[i];
     });
   }
 
@@ -229,6 +232,10 @@ class Dfsph {
                               Scalar tolerance, Scalar largest) noexcept {
     complementarity_.mean_tolerance = static_cast<double>(tolerance_factor * tolerance);
     complementarity_.largest_tolerance = static_cast<double>(tolerance_factor * largest);
+    // whole regions must not give way the more for it: that adds up over the depth
+    complementarity_.net_tolerance = static_cast<double>(net_share * std::min(tolerance_factor, Scalar(1)) * tolerance);
+    // with tight tolerances, liquid at rest simmers by what an old matrix leaves
+    complementarity_.sub_steps_per_matrix = tolerance_factor > 1 ? 4 : 1;
     complementarity_.most_iterations = most_iterations;
     return complementarity_.solve(step, system, offset_, term);
   }

@@ -47,6 +47,8 @@ class PositionBased {
   Scalar recovery = Scalar(0.3);
   /// epsilon over the denominator of a full neighbourhood [-], >= 0: softens particles with few neighbours.
   Scalar softness = Scalar(0.01);
+  /// Whether reports say what is left when most_iterations are done: it takes one more look at all pairs.
+  bool measures_what_is_left = true;
 
   /// Carried from step to step.
   struct Memory {
@@ -63,7 +65,7 @@ class PositionBased {
   /// that followed it would get ever shorter and turn a per cent of compression into metres per second.
   template <class Step>
   Scalar largest_step(const Step& step) const noexcept {
-    return largest_stable_step(step, memory_.calm_pressure, std::numeric_limits<double>::infinity());
+    return largest_stable_step(step, memory_.calm_pressure, std::numeric_limits<double>::infinity(), 0.3);
   }
 
   template <class Step>
@@ -92,19 +94,27 @@ class PositionBased {
     });
     // Denominator of a lattice without walls, about: m / rho_0 is d^3, and |grad C|^2 adds up to some 1 / d^2.
     const Scalar floor = std::max(softness, Scalar(1e-6)) / (step.spacing * step.spacing);
+    const bool alike = (step.fluid.mass.array() == step.fluid.mass[0]).all();
+    const bool at_rest = step.fluid.velocity.isZero(0);
     Compression left;
     int iterations = 0;
     for (;;) {
-      left = find_factors(step, floor);
+      if (iterations == most_iterations && !measures_what_is_left) {
+        break;
+      }
+      const bool moved = !at_rest || iterations > 0;
+      for_pairs(alike, moved, [&](auto pairs) { left = find_factors<decltype(pairs)>(step, floor); });
       if (left.beyond <= static_cast<double>(density_tolerance) || iterations == most_iterations) {
         break;  // what is left belongs to the positions as they are: the factors are not used
       }
-      move(step);
+      for_pairs(alike, moved, [&](auto pairs) { move<decltype(pairs)>(step); });
       ++iterations;
     }
     report.density_iterations += iterations;
-    report.density_error = std::max(report.density_error, left.all);
-    report.converged = report.converged && left.beyond <= static_cast<double>(density_tolerance);
+    if (iterations < most_iterations || measures_what_is_left) {
+      report.density_error = std::max(report.density_error, left.all);
+      report.converged = report.converged && left.beyond <= static_cast<double>(density_tolerance);
+    }
     parallel_for(count, step.threads, [&](Index i) {
       const Scalar* record = &records_[static_cast<std::size_t>(4 * i)];
       step.fluid.velocity.col(i) = Vector3<Scalar>(record[0], record[1], record[2]) / dt;
@@ -131,20 +141,45 @@ class PositionBased {
     calm = std::min(mean, calm + 0.2 * std::max(calm, one_layer));
   }
 
+  /// What is known of all pairs of a sweep, and need not be fetched from all over for each: that all particles have one
+  /// mass, and whether any was moved since the list of neighbours was made.
+  template <bool Alike, bool AnyMoved>
+  struct Pairs {
+    static constexpr bool alike = Alike, any_moved = AnyMoved;
+  };
+  template <class Sweep>
+  static void for_pairs(bool alike, bool any_moved, Sweep&& sweep) {
+    if (!alike) {
+      sweep(Pairs<false, true>{});
+    } else if (any_moved) {
+      sweep(Pairs<true, true>{});
+    } else {
+      sweep(Pairs<true, false>{});
+    }
+  }
+
   /// Separations at the predicted positions, pair by pair: those of the list and the difference of what was moved.
   /// Works in periodic domains as well.
   struct Moved {
     B x, y, z, distance, mass;
   };
-  template <class Pair>
+  template <class Kind, class Pair>
   [[gnu::always_inline]] Moved moved(const Pair& pair, const Scalar* own) const noexcept {
-    const auto other = gather4(records_.data(), pair.neighbor);
     Moved result;
-    result.x = pair.x + (B(own[0]) - other.x);
-    result.y = pair.y + (B(own[1]) - other.y);
-    result.z = pair.z + (B(own[2]) - other.z);
+    if constexpr (Kind::any_moved) {
+      const auto other = gather4(records_.data(), pair.neighbor);
+      result.x = pair.x + (B(own[0]) - other.x);
+      result.y = pair.y + (B(own[1]) - other.y);
+      result.z = pair.z + (B(own[2]) - other.z);
+      result.mass = Kind::alike ? B(own[3]) : other.w;
+    } else {
+      static_assert(Kind::alike);
+      result.x = pair.x;
+      result.y = pair.y;
+      result.z = pair.z;
+      result.mass = B(own[3]);
+    }
     result.distance = square_root(squared_length(result.x, result.y, result.z));
-    result.mass = other.w;
     return result;
   }
 
@@ -154,7 +189,7 @@ class PositionBased {
   };
 
   /// lambda of every particle; returns how compressed the liquid is before it acts.
-  template <class Step>
+  template <class Kind, class Step>
   Compression find_factors(const Step& step, Scalar floor) noexcept {
     using Kernel = typename Step::Kernel;
     const Index count = step.fluid.size();
@@ -169,14 +204,18 @@ class PositionBased {
             const Scalar* record = &records_[4 * own];
             B density(Scalar(0)), x(Scalar(0)), y(Scalar(0)), z(Scalar(0)), squares(Scalar(0));
             step.neighbors.for_each_batch(i, [&](const auto& pair) {
-              const Moved at = moved(pair, record);
+              const Moved at = moved<Kind>(pair, record);
               density += select(pair.valid, at.mass * Kernel::value(at.distance, h), B(Scalar(0)));
               const B slope = at.mass * Kernel::derivative_over_radius(at.distance, h);
               const B gx = slope * at.x, gy = slope * at.y, gz = slope * at.z;
               x += gx;
               y += gy;
               z += gz;
-              squares += squared_length(gx, gy, gz) * (B(record[3]) / at.mass);
+              if constexpr (Kind::alike) {
+                squares += squared_length(gx, gy, gz);
+              } else {
+                squares += squared_length(gx, gy, gz) * (B(record[3]) / at.mass);
+              }
             });
             const Vector3<Scalar> wall = step.walls.gradient.col(i);
             const Scalar fraction = step.walls.share[i] + wall[0] * record[0] + wall[1] * record[1] +
@@ -200,7 +239,7 @@ class PositionBased {
     return {total.all / static_cast<double>(count), total.beyond / static_cast<double>(count)};
   }
 
-  template <class Step>
+  template <class Kind, class Step>
   void move(const Step& step) noexcept {
     using Kernel = typename Step::Kernel;
     const Index count = step.fluid.size();
@@ -212,9 +251,12 @@ class PositionBased {
       const B own_factor(factor_[own]);
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const Moved at = moved(pair, record);
-        const B push = at.mass * (own_factor + gather(factor_.data(), pair.neighbor)) *
-                       Kernel::derivative_over_radius(at.distance, h);
+        const B both = own_factor + gather(factor_.data(), pair.neighbor);
+        if (all(both == B(Scalar(0)))) {
+          return;  // nobody here is too dense
+        }
+        const Moved at = moved<Kind>(pair, record);
+        const B push = at.mass * both * Kernel::derivative_over_radius(at.distance, h);
         x = multiply_add(push, at.x, x);
         y = multiply_add(push, at.y, y);
         z = multiply_add(push, at.z, z);

@@ -3,17 +3,19 @@
 
 /// The linear system behind incompressible SPH: what pressures do to velocities, and what velocities do to densities.
 
-#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include <decant/core/batch.hpp>
+#include <decant/core/compact.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/types.hpp>
 
 namespace decant {
 
-/// Pairs' kernel gradients are computed once per sub-step and reused by every sweep.
+/// Pairs' kernel gradients are computed once per sub-step and reused by every sweep. They are kept as Compact numbers,
+/// since sweeps wait for them: each may be off by one part in 4,000, which is as if particles were off by a thousandth
+/// of the spacing, and the same for both of a pair, so momentum is kept to rounding.
 ///
 /// With P_i = p_i / rho_i^2 [m^5/(kg s^2)], matrices L_i and the walls' shares s_i of rest density
 /// (boundary/wall_function.hpp),
@@ -31,21 +33,18 @@ class PressureSystem {
   /// Takes the sub-step's geometry: pairs, walls, masses.
   template <class Step>
   void assemble(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     corrected_ = false;
     resize(step);
     const auto& list = step.neighbors;
-    const Scalar* mass = step.fluid.mass.data();
+    const B unit(unit_);
     parallel_for(count_, step.threads, [&](Index i) {
       Sums sums;
-      const B mass_i(mass[i]);
+      const B own_weight(weight_[static_cast<std::size_t>(i)]);
       list.for_each_batch(i, [&](const auto& pair) {
-        const B mass_j = gather(mass, pair.neighbor);
-        const B slope =
-            mass_j * Kernel::derivative_over_radius(square_root(pair.distance_squared), step.smoothing_length);
-        const Batch3<Scalar> gradient{slope * pair.x, slope * pair.y, slope * pair.z};
-        store(gradient, &rate_[3 * pair.slot]);
-        sums.add(gradient, mass_i / mass_j);
+        const B slope = unit * step.pairs.slope(pair.slot);
+        CompactScalar* const place = &rate_[3 * pair.slot];
+        store({slope * pair.x, slope * pair.y, slope * pair.z}, place);
+        sums.add(load(place), weights(pair.neighbor), own_weight);
       });
       Scalar flux = 0;
       Vector3<Scalar> wall = Vector3<Scalar>::Zero();
@@ -65,21 +64,14 @@ class PressureSystem {
     resize(step);
     push_.resize(rate_.size());
     const auto& list = step.neighbors;
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(count_, step.threads, [&](Index i) {
       Sums sums;
-      const B mass_i(mass[i]);
-      const Vector3<Scalar> x = step.correction.apply(i, Vector3<Scalar>::UnitX()),
-                            y = step.correction.apply(i, Vector3<Scalar>::UnitY()),
-                            z = step.correction.apply(i, Vector3<Scalar>::UnitZ());
+      const B own_weight(weight_[static_cast<std::size_t>(i)]);
       for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
         const Batch3<Scalar> gradient = load(&plain.rate_[3 * at]);
-        const Batch3<Scalar> own{gradient.x * x[0] + gradient.y * x[1] + gradient.z * x[2],
-                                 gradient.x * y[0] + gradient.y * y[1] + gradient.z * y[2],
-                                 gradient.x * z[0] + gradient.y * z[1] + gradient.z * z[2]};
-        store(own, &rate_[3 * at]);
+        store(step.correction.apply(i, gradient), &rate_[3 * at]);
         store(step.correction.apply(list.index() + at, gradient), &push_[3 * at]);
-        sums.add(own, mass_i / gather(mass, list.index() + at));
+        sums.add(load(&rate_[3 * at]), weights(list.index() + at), own_weight);
       }
       Scalar flux = 0;
       Vector3<Scalar> wall = Vector3<Scalar>::Zero();
@@ -98,7 +90,10 @@ class PressureSystem {
   /// -dD_i / dP_i, the response of a particle's density rate to its own pressure; >= 0.
   const Scalar* diagonal() const noexcept { return diagonal_.data(); }
 
-  /// Accelerations of all particles, in records of four numbers: x, y, z and one unused.
+  /// What pairs' sums are weighted by: m_i / h^4 [kg/m^4].
+  const Scalar* weights() const noexcept { return weight_.data(); }
+
+  /// Accelerations of all particles, in records of four numbers: x, y, z and weights().
   const Scalar* accelerations() const noexcept { return records_.data(); }
   /// For a solver that has summed them up itself.
   std::vector<Scalar>& accelerations_to_replace() noexcept { return records_; }
@@ -106,12 +101,21 @@ class PressureSystem {
   /// Computes accelerations() from P, which has one entry per particle.
   template <class Neighbors>
   void accelerate(const Neighbors& list, const Scalar* pressure_term, Threads threads) noexcept {
-    const Scalar* const push = corrected_ ? push_.data() : rate_.data();
+    const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
+    const Scalar* weighted = pressure_term;
+    if (common_weight_ == 0) {
+      weighted = weighted_.data();
+      parallel_for(count_, threads, [&](Index i) {
+        const auto own = static_cast<std::size_t>(i);
+        weighted_[own] = weight_[own] * pressure_term[own];
+      });
+    }
+    const Scalar factor = common_weight_ == 0 ? Scalar(1) : common_weight_;
     parallel_for(count_, threads, [&](Index i) {
       const auto own = static_cast<std::size_t>(i);
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
-        const B term = gather(pressure_term, list.index() + at);
+        const B term = gather(weighted, list.index() + at);
         const Batch3<Scalar> gradient = load(push + 3 * at);
         x = multiply_add(term, gradient.x, x);
         y = multiply_add(term, gradient.y, y);
@@ -119,38 +123,40 @@ class PressureSystem {
       }
       const Scalar* total = &total_[4 * own];
       Scalar* record = &records_[4 * own];
-      record[0] = -(sum(x) + pressure_term[own] * total[0]);
-      record[1] = -(sum(y) + pressure_term[own] * total[1]);
-      record[2] = -(sum(z) + pressure_term[own] * total[2]);
-      record[3] = 0;
+      record[0] = -(factor * sum(x) + pressure_term[own] * total[0]);
+      record[1] = -(factor * sum(y) + pressure_term[own] * total[1]);
+      record[2] = -(factor * sum(z) + pressure_term[own] * total[2]);
+      record[3] = weight_[own];
     });
   }
 
-  /// Calls f(j, x, y, z) with minus the acceleration of particle i by a unit of P_j, for its neighbours and itself.
+  /// Minus the accelerations of particle i by a unit of P_j: calls f(neighbor, x, y, z) for each batch of neighbours j,
+  /// whose numbers are at `neighbor`. Rows are filled up with i itself and zeros.
   template <class Neighbors, class Function>
-  void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
-    const Scalar* const push = corrected_ ? push_.data() : rate_.data();
-    const auto own = static_cast<std::size_t>(i);
-    const std::size_t first = list.first(i), count = static_cast<std::size_t>(list.count(i));
-    for (std::size_t k = 0; k < count; ++k) {
-      const Scalar* gradient = push + 3 * (first + k - k % width) + k % width;
-      f(static_cast<std::size_t>(list.index()[first + k]), gradient[0], gradient[width], gradient[2 * width]);
+  [[gnu::always_inline]] void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
+    const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
+    for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
+      const std::uint32_t* const neighbor = list.index() + at;
+      const B weight = weights(neighbor);
+      const Batch3<Scalar> gradient = load(push + 3 * at);
+      f(neighbor, weight * gradient.x, weight * gradient.y, weight * gradient.z);
     }
-    f(own, total_[4 * own], total_[4 * own + 1], total_[4 * own + 2]);
   }
+  /// The same by a unit of its own P.
+  const Scalar* own_response(Index i) const noexcept { return &total_[4 * static_cast<std::size_t>(i)]; }
 
-  /// D_i of one particle for vectors in records of four: velocities, or accelerations (then walls do not move).
+  /// D_i of one particle for vectors in records of four, the last one weights(): velocities, or accelerations (then
+  /// walls do not move).
   template <class Neighbors>
   [[gnu::always_inline]] Scalar density_rate(const Neighbors& list, const Scalar* records, Index i,
                                              bool walls_move) const noexcept {
     const auto own = static_cast<std::size_t>(i);
     B away(Scalar(0));
     for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
-      const auto other = gather3(records, list.index() + at);
+      const auto other = gather4(records, list.index() + at);
       const Batch3<Scalar> gradient = load(&rate_[3 * at]);
-      away = multiply_add(other.x, gradient.x, away);
-      away = multiply_add(other.y, gradient.y, away);
-      away = multiply_add(other.z, gradient.z, away);
+      const B along = multiply_add(other.z, gradient.z, multiply_add(other.y, gradient.y, other.x * gradient.x));
+      away = multiply_add(other.w, along, away);
     }
     const Scalar* record = records + 4 * own;
     const Scalar* total = &total_[4 * own];
@@ -162,31 +168,44 @@ class PressureSystem {
   using B = Batch<Scalar>;
   static constexpr auto width = static_cast<std::size_t>(B::width);
 
-  /// Over a particle's pairs: of the gradients, and of their squares.
+  using CompactScalar = Compact<Scalar>;
+
+  /// Over a particle's pairs: of masses times gradients, and of their squares.
   struct Sums {
     B x{Scalar(0)}, y{Scalar(0)}, z{Scalar(0)}, squares{Scalar(0)};
 
-    [[gnu::always_inline]] void add(const Batch3<Scalar>& gradient, B mass_ratio) noexcept {
-      x += gradient.x;
-      y += gradient.y;
-      z += gradient.z;
-      squares += squared_length(gradient.x, gradient.y, gradient.z) * mass_ratio;
+    [[gnu::always_inline]] void add(const Batch3<Scalar>& gradient, B weight, B own_weight) noexcept {
+      x = multiply_add(weight, gradient.x, x);
+      y = multiply_add(weight, gradient.y, y);
+      z = multiply_add(weight, gradient.z, z);
+      squares = multiply_add(own_weight * weight, squared_length(gradient.x, gradient.y, gradient.z), squares);
     }
   };
 
-  [[gnu::always_inline]] static Batch3<Scalar> load(const Scalar* from) noexcept {
-    return {B::load(from), B::load(from + width), B::load(from + 2 * width)};
+  [[gnu::always_inline]] B weights(const std::uint32_t* neighbor) const noexcept {
+    return common_weight_ > 0 ? B(common_weight_) : gather(weight_.data(), neighbor);
   }
-  [[gnu::always_inline]] static void store(const Batch3<Scalar>& gradient, Scalar* to) noexcept {
-    gradient.x.store(to);
-    gradient.y.store(to + width);
-    gradient.z.store(to + 2 * width);
+
+  [[gnu::always_inline]] static Batch3<Scalar> load(const CompactScalar* from) noexcept {
+    return {load_compact<Scalar>(from), load_compact<Scalar>(from + width), load_compact<Scalar>(from + 2 * width)};
+  }
+  [[gnu::always_inline]] static void store(const Batch3<Scalar>& gradient, CompactScalar* to) noexcept {
+    store_compact(gradient.x, to);
+    store_compact(gradient.y, to + width);
+    store_compact(gradient.z, to + 2 * width);
   }
 
   template <class Step>
   void resize(const Step& step) {
     count_ = step.fluid.size();
     rest_density_ = step.rest_density;
+    const Scalar squared = step.smoothing_length * step.smoothing_length;
+    unit_ = squared * squared;
+    common_weight_ = step.pairs.common_mass() / unit_;
+    weight_.resize(static_cast<std::size_t>(count_));
+    weighted_.resize(static_cast<std::size_t>(count_));
+    parallel_for(count_, step.threads,
+                 [&](Index i) { weight_[static_cast<std::size_t>(i)] = step.fluid.mass[i] / unit_; });
     rate_.resize(3 * step.neighbors.index_size());
     total_.resize(4 * static_cast<std::size_t>(count_));
     diagonal_.resize(static_cast<std::size_t>(count_));
@@ -205,9 +224,13 @@ class PressureSystem {
 
   Index count_ = 0;
   Scalar rest_density_ = 0;
+  Scalar common_weight_ = 0;  ///< of all particles; 0 where they differ
+  Scalar unit_ = 0;           ///< h^4, which brings gradients to the order of one [m^4]
   bool corrected_ = false;
-  std::vector<Scalar> rate_{};  ///< m_j L_i grad W_ij in the order of the list's index: a batch of x, of y, of z
-  std::vector<Scalar> push_{};  ///< m_j L_j grad W_ij likewise, where L is not 1
+  std::vector<CompactScalar> rate_{};  ///< h^4 L_i grad W_ij in the order of the list's index: a batch of x, of y, of z
+  std::vector<CompactScalar> push_{};  ///< h^4 L_j grad W_ij likewise, where L is not 1
+  std::vector<Scalar> weight_{};       ///< m_i / h^4
+  std::vector<Scalar> weighted_{};     ///< the same times P_i
   std::vector<Scalar>
       total_{};  ///< sum_j m_j L_i grad W_ij + rho_0 L_i grad s, and the walls' part of -D; records of four
   std::vector<Scalar> diagonal_{};

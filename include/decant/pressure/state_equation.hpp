@@ -140,19 +140,17 @@ class StateEquation {
 
   template <bool brake, class Step>
   void sweep(const Step& step) noexcept {
-    using Kernel = typename Step::Kernel;
     using B = Batch<Scalar>;
     const Scalar h = step.smoothing_length;
     const Scalar softening = Scalar(0.01) * h * h;
     // densities differ by a per cent: rho_0 for rho_ij keeps the pair force mutual and saves a gather
     const Scalar braking = artificial_viscosity * h * sound_speed(step.rest_density) / step.rest_density;
-    const Scalar* mass = step.fluid.mass.data();
     parallel_for(step.fluid.size(), step.threads, [&](Index i) {
       const auto own = static_cast<std::size_t>(i);
       const B term_i(term_[own]);
       B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
       step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const B slope = Kernel::derivative_over_radius(square_root(pair.distance_squared), h);
+        const B slope = step.pairs.slope(pair.slot);
         B push = term_i + gather(term_.data(), pair.neighbor);
         if constexpr (brake) {
           const auto other = gather3(velocity_.data(), pair.neighbor);
@@ -160,7 +158,7 @@ class StateEquation {
                              (velocity_[4 * own + 2] - other.z) * pair.z;
           push -= braking * minimum(approach, B(Scalar(0))) / (pair.distance_squared + softening);
         }
-        push *= slope * gather(mass, pair.neighbor);
+        push *= slope * step.mass(pair.neighbor);
         x = multiply_add(push, pair.x, x);
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);

@@ -39,6 +39,14 @@ class DiscSplat {
   template <CameraModel Camera>
   PixelBox render(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> hidden, const Camera& camera,
                   const Pose& camera_from_world, ImageView<float> coverage, Threads threads = {}) noexcept {
+    return render(position, hidden, camera, camera_from_world, coverage, PixelBox::of(coverage), threads);
+  }
+
+  /// The same into a coverage that is zero outside of `stale`, such as what the render before returned.
+  template <CameraModel Camera>
+  PixelBox render(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> hidden, const Camera& camera,
+                  const Pose& camera_from_world, ImageView<float> coverage, const PixelBox& stale,
+                  Threads threads) noexcept {
     const PixelBox image = PixelBox::of(coverage);
     const PixelBox drawn = splatter_.template place<Scalar>(
         position, hidden, camera_from_world, threads, [&](const Vector3<double>& x_in_camera) {
@@ -46,7 +54,7 @@ class DiscSplat {
           return area_scale > 0 ? disc(camera.project(x_in_camera).pixel, radius_ * std::sqrt(area_scale), image)
                                 : Disc{};
         });
-    splatter_.draw(coverage, threads, [](const Disc& disc, int v, float* row) {
+    splatter_.draw(coverage, stale.intersection(image), threads, [](const Disc& disc, int v, float* row) {
       const double below = v - disc.v;
       const double half = std::sqrt(std::max(0.0, disc.radius_squared - below * below));
       detail::count_pixels(row, detail::pixel_between(std::ceil(disc.u - half), disc.box.u_begin, disc.box.u_end),

@@ -59,8 +59,10 @@ class Silhouette {
                   "Silhouette's projector must model decant::Projector, see <decant/projector/concept.hpp>");
     if (coverage_.rows() != mask.rows() || coverage_.cols() != mask.cols()) {
       coverage_.resize(mask.rows(), mask.cols());
+      drawn_ = PixelBox::of(coverage_);  // anything may be there
     }
-    const PixelBox drawn = projector_.render(position, hidden, camera, camera_from_world, coverage_, threads);
+    const PixelBox drawn = draw(position, hidden, camera, camera_from_world, threads);
+    drawn_ = drawn;
     silhouette(coverage_, drawn, mask, threads);
     closing_.apply(mask, drawn, threads);
     return drawn;
@@ -73,9 +75,23 @@ class Silhouette {
   const GapClosing& closing() const noexcept { return closing_; }
 
  private:
+  /// Projectors that can do with less clear only what they drew the last time.
+  template <class Camera>
+  PixelBox draw(const ConstPointsView<Scalar>& position, std::span<const std::uint8_t> hidden, const Camera& camera,
+                const Pose& camera_from_world, Threads threads) noexcept {
+    if constexpr (requires {
+                    projector_.render(position, hidden, camera, camera_from_world, coverage_, drawn_, threads);
+                  }) {
+      return projector_.render(position, hidden, camera, camera_from_world, coverage_, drawn_, threads);
+    } else {
+      return projector_.render(position, hidden, camera, camera_from_world, coverage_, threads);
+    }
+  }
+
   ProjectorType projector_;
   GapClosing closing_;
   Image<float> coverage_;
+  PixelBox drawn_{};  ///< outside of it coverage_ is zero
 };
 
 }  // namespace decant

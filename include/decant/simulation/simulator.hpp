@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -15,12 +16,14 @@
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/concept.hpp>
 #include <decant/boundary/mesh_report.hpp>
+#include <decant/boundary/remembered_walls.hpp>
 #include <decant/boundary/shielding.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/kernel/concept.hpp>
@@ -188,6 +191,10 @@ class Simulator {
       return report;
     }
     remember();
+    if constexpr (requires { solver_.begin_frame(); }) {
+      solver_.begin_frame();
+    }
+    remembered_walls_.forget();
     const double end = time_ + frame_time;
     bool converged = true;
     while (report.status == StepStatus::Ok && time_ < end) {
@@ -276,21 +283,28 @@ class Simulator {
     if (!taken_.empty()) {
       kept_velocity_ = fluid_.velocity;
       for (BodyId body = 0; body < bodies_.size(); ++body) {
-        bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+        if constexpr (requires { bodies_.push_out(body, 1.0, fluid_, settings_.threads); }) {
+          bodies_.push_out(body, 0.5 * settings_.spacing, fluid_, settings_.threads);
+        } else {
+          bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+        }
       }
       fluid_.velocity = kept_velocity_;
       for (const std::uint32_t i : taken_) {
         before_.col(i) = fluid_.position.col(i);  // no path to look after
       }
     }
-    bodies_.sample(before_, settings_.spacing, settings_.threads, walls_);
+    remembered_walls_.sample(bodies_, time_, before_, settings_.spacing, settings_.threads, walls_);
     Index cut_short = keep_on_sides();  // this takes the speed into walls
     if (sweeps > 0 && fluid_.size() > 0) {
-      find_neighbors();
+      sort_into_lists();
+      remembered_walls_.sample(bodies_, time_, fluid_.position, settings_.spacing, settings_.threads, walls_);
+      shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
       kept_velocity_ = fluid_.velocity;
       fluid_.velocity.setZero();
       apart_.most_iterations = sweeps;
       apart_.recovery = 1;
+      apart_.measures_what_is_left = false;
       PressureReport report;
       apart_.solve(view(1), report);
       before_ = fluid_.position;
@@ -371,6 +385,7 @@ class Simulator {
     fluid_ = snapshot.fluid;
     solver_.memory() = snapshot.memory;
     bodies_ = snapshot.bodies;
+    remembered_walls_.forget();
     time_ = snapshot.time;
     longest_step_ = snapshot.longest_step;
     next_id_ = snapshot.next_id;
@@ -448,6 +463,7 @@ class Simulator {
   Step view(double time_step) noexcept {
     return {fluid_,
             neighbors_,
+            pairs_,
             walls_,
             correction_,
             shift_,
@@ -505,32 +521,40 @@ class Simulator {
 
   /// @return whether the pressure solver converged.
   bool sub_step(double time_step, StepReport& report) noexcept {
+    StepTimes& times = report.times;
     bodies_.set_interval(time_, time_step);
     pour_in(time_step);
-    find_neighbors();
-    compute_densities();
-
+    find_neighbors(times);
     const Step step = view(time_step);
-    if constexpr (corrects_gradients) {
-      correction_.compute(step);
-    }
+    timed(times.sums_ms, [&] {
+      pairs_.compute(step);
+      if constexpr (corrects_gradients) {
+        correction_.compute(step);
+      }
+    });
     PressureReport pressure;
     shift_.set_count(fluid_.size());
     shift_.setZero();
-    solver_.begin_step(step, pressure);
-    apply_forces<false>(step);
-    solver_.solve(step, pressure);
-    apply_forces<true>(step);
+    timed(times.pressure_ms, [&] { solver_.begin_step(step, pressure); });
+    timed(times.forces_ms, [&] { apply_forces<false>(step); });
+    timed(times.pressure_ms, [&] { solver_.solve(step, pressure); });
+    timed(times.forces_ms, [&] { apply_forces<true>(step); });
     if constexpr (requires { solver_.correct_places(step, pressure); }) {
-      solver_.correct_places(step, pressure);
+      timed(times.pressure_ms, [&] { solver_.correct_places(step, pressure); });
     }
-    advance(time_step, report);
+    timed(times.moving_ms, [&] { advance(time_step, report); });
 
     report.density_iterations += pressure.density_iterations;
     report.divergence_iterations += pressure.divergence_iterations;
     report.density_error = std::max(report.density_error, pressure.density_error);
     report.divergence_error = std::max(report.divergence_error, pressure.divergence_error);
     return pressure.converged;
+  }
+
+  template <class Work>
+  static void timed(double& total_ms, Work&& work) noexcept {
+    const Stopwatch watch(total_ms);
+    work();
   }
 
   template <bool after_pressure>
@@ -555,7 +579,15 @@ class Simulator {
     }
   }
 
-  void find_neighbors() noexcept {
+  void find_neighbors(StepTimes& times) noexcept {
+    timed(times.sorting_ms, [&] { sort_into_lists(); });
+    timed(times.walls_ms, [&] {
+      bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
+      shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
+    });
+  }
+
+  void sort_into_lists() noexcept {
     const double support = settings_.spacing * settings_.support_in_spacings;
     const Scalar reach = static_cast<Scalar>(support * (1 + static_cast<double>(Solver::search_margin)));
     search_.rebuild(fluid_.position, reach, settings_.threads);
@@ -565,23 +597,6 @@ class Simulator {
       search_.adopt_order(settings_.threads);
     }
     neighbors_.build_from(search_, fluid_.position, settings_.threads);
-    bodies_.sample(fluid_.position, settings_.spacing, settings_.threads, walls_);
-    shield_.apply(bodies_, walls_, neighbors_, settings_.threads);
-  }
-
-  void compute_densities() noexcept {
-    const Scalar h = static_cast<Scalar>(smoothing_length_);
-    const Scalar rest_density = static_cast<Scalar>(settings_.liquid.density);
-    const Scalar own = Kernel::value(Scalar(0), h);
-    const Scalar* mass = fluid_.mass.data();
-    parallel_for(fluid_.size(), settings_.threads, [&](Index i) {
-      Batch<Scalar> total(Scalar(0));
-      neighbors_.for_each_batch(i, [&](const auto& pair) {
-        const auto share = gather(mass, pair.neighbor) * Kernel::value(square_root(pair.distance_squared), h);
-        total += select(pair.valid, share, Batch<Scalar>(Scalar(0)));
-      });
-      fluid_.density[i] = sum(total) + mass[i] * own + rest_density * walls_.share[i];
-    });
   }
 
   void advance(double time_step, StepReport& report) noexcept {
@@ -620,6 +635,7 @@ class Simulator {
       std::swap(moved, array);
     });
     solver_.memory().reorder(order);
+    remembered_walls_.reorder(order, settings_.threads, walls_);
   }
 
   auto& scratch_of(Growable<Scalar, 3>&) noexcept { return scratch_points_; }
@@ -704,6 +720,7 @@ class Simulator {
 
   FluidState<Scalar> fluid_{};
   Neighbors neighbors_;
+  PairKernel<Scalar> pairs_{};
   WallState<Scalar> walls_{};
   WallShield<Scalar> shield_{};
   GradientCorrection<Scalar> correction_{};
@@ -718,6 +735,7 @@ class Simulator {
   Growable<Scalar, 3> kept_velocity_{};
   PositionBased<Scalar> apart_{};
   std::vector<std::uint32_t> taken_{};  ///< particles that a corrector took from one place to another
+  RememberedWalls<Scalar> remembered_walls_{};
   Growable<Scalar, 3> shift_{};
   Growable<Scalar, 3> scratch_points_{};
   Growable<Scalar, 1> scratch_scalars_{};

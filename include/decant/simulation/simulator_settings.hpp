@@ -22,8 +22,8 @@ struct SimulatorSettings {
   double courant_number = 0.4;           ///< how many spacings liquid may move past a body per sub-step,
                                          ///< 0 < .. <= 2
   double stability_number = 0.3;         ///< the same, in a sub-step, of the speed that pressure stands for: see
-                                         ///< largest_stable_step; 0 < .. <= 1, deep liquid collapses above 0.4
-  double tolerance_factor = 1;           ///< of the pressure solver's tolerances, 0.01 .. 100
+                                         ///< largest_stable_step; 0 < .. <= 1, deep liquid collapses at 0.5
+  double tolerance_factor = 1;           ///< of the pressure solver's tolerances for single particles, 0.01 .. 100
   double fixed_step = 0;                 ///< if > 0, the length of every sub-step [s] (frames need not fit)
   int most_sub_steps = 2000;             ///< per frame; beyond it a frame is refused
   double numerical_viscosity = 0.6;      ///< of ResidualViscosity, in units of d sqrt(g d), and a third of it in
@@ -33,9 +33,8 @@ struct SimulatorSettings {
 };
 
 /// For liquid that a camera keeps correcting, or that is one hypothesis among many: longer sub-steps, each with fewer
-/// iterations. Pours are predicted as well as with the settings that are handed in, in about half the time; the density
-/// is kept within 1 % in place of 0.1 %. A stability_number of 0.6 is faster by a third where liquid is shallow, but
-/// 34 layers of it in a bottle fall into themselves, and their silhouette goes astray with them.
+/// iterations. Pours are predicted as well as with the settings that are handed in, in about half the time; single
+/// particles are kept within 1 % of the density in the mean in place of 0.1 %, whole regions as before.
 inline SimulatorSettings for_tracking(SimulatorSettings settings) {
   settings.courant_number = 1.6;
   settings.stability_number = 0.4;

@@ -72,6 +72,18 @@ class ContentsList {
   std::size_t size_ = 0;
 };
 
+/// Wall time of a frame's sub-steps by what it was spent on [ms].
+struct StepTimes {
+  double sorting_ms = 0;    ///< particles into cells, and their neighbour lists
+  double walls_ms = 0;      ///< what bodies add at each particle, and what they hide
+  double sums_ms = 0;       ///< densities and corrected gradients
+  double forces_ms = 0;     ///< all force terms
+  double pressure_ms = 0;   ///< the pressure solver
+  double moving_ms = 0;     ///< particles along their velocities, with the guard at walls
+
+  double total() const noexcept { return sorting_ms + walls_ms + sums_ms + forces_ms + pressure_ms + moving_ms; }
+};
+
 /// One frame. Sums and maxima are over the frame's sub-steps.
 struct StepReport {
   StepStatus status = StepStatus::Ok;
@@ -88,6 +100,7 @@ struct StepReport {
   Index lost = 0;                  ///< particles that passed a wall because bodies left them no room, since the start
   Index non_finite = 0;            ///< particles with a non-finite position or velocity (status NonFinite)
   ContentsList contents{};         ///< of the containers that are watched, at the end of the frame
+  StepTimes times{};
 
   /// True if the frame was simulated; false if the state is unchanged.
   bool advanced() const { return status == StepStatus::Ok || status == StepStatus::NotConverged; }

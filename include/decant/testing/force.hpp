@@ -31,6 +31,7 @@ struct LooseLiquid {
 
   FluidState<Scalar> fluid{};
   Neighbors neighbors{};
+  PairKernel<Scalar> pairs{};
   WallState<Scalar> walls{};
   GradientCorrection<Scalar> correction{};
   Growable<Scalar, 3> shift{};
@@ -73,7 +74,8 @@ struct LooseLiquid {
     neighbors.build(search, fluid.position,
                     static_cast<Scalar>(static_cast<double>(Kernel::support_factor) * (1 + margin)) * smoothing_length,
                     threads);
-    for (Index i = 0; i < fluid.size(); ++i) {
+    pairs.compute(view());
+    for (Index i = 0; i < fluid.size(); ++i) {  // once more, in a way of its own
       Scalar density = fluid.mass[i] * Kernel::value(Scalar(0), smoothing_length);
       neighbors.for_each(i, [&](Index j, const Vector3<Scalar>&, Scalar r_squared) {
         density += fluid.mass[j] * Kernel::value(std::sqrt(r_squared), smoothing_length);
@@ -84,8 +86,8 @@ struct LooseLiquid {
   }
 
   StepView<Kernel, Neighbors> view() {
-    return {fluid,   neighbors,    walls,     correction, shift,  smoothing_length,
-            spacing, rest_density, time_step, 0.0,        threads};
+    return {fluid,   neighbors,    pairs,     walls, correction, shift, smoothing_length,
+            spacing, rest_density, time_step, 0.0,   threads};
   }
 };
 

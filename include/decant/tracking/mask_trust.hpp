@@ -7,6 +7,7 @@
 
 #include <decant/core/image.hpp>
 #include <decant/core/types.hpp>
+#include <decant/coverage/detail/liquid_box.hpp>
 
 namespace decant {
 
@@ -19,7 +20,7 @@ class MaskTrust {
 
   /// To be called once a frame.
   bool believes(const ConstMaskView& mask) noexcept {
-    const Index pixels = (mask >= 128).count();
+    const Index pixels = detail::count_liquid(mask);
     const bool believed = pixels >= least_pixels_ || last_ <= 4 * static_cast<Index>(least_pixels_);
     if (believed) {
       last_ = pixels;

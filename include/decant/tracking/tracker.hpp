@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -21,6 +20,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/stopwatch.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
@@ -260,20 +260,6 @@ class Tracker {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
-  class Stopwatch {
-   public:
-    explicit Stopwatch(double& total_ms) noexcept : total_ms_(total_ms), start_(Clock::now()) {}
-    ~Stopwatch() { total_ms_ += std::chrono::duration<double, std::milli>(Clock::now() - start_).count(); }
-    Stopwatch(const Stopwatch&) = delete;
-    Stopwatch& operator=(const Stopwatch&) = delete;
-
-   private:
-    double& total_ms_;
-    Clock::time_point start_;
-  };
-
   /// A camera with all that belongs to its picture.
   struct Eye {
     RayOcclusion<Camera> occlusion;
@@ -357,7 +343,7 @@ class Tracker {
     const auto& position = const_cast<Model&>(model).fluid().position;
     eye.occlusion.follow(model.bodies(), model.time());
     eye.hidden.resize(static_cast<std::size_t>(position.count()));
-    find_hidden(eye.occlusion, position, settings_.threads, eye.hidden);
+    eye.occlusion.find_hidden(position, settings_.threads, eye.hidden);
     const PosedCamera<Camera>& camera = eye.occlusion.camera();
     const double gap_px = settings_.gap_closing_in_spacings * model.spacing() * pixels_per_metre(camera, position);
     eye.silhouette.closing().set_gap_px(static_cast<int>(std::lround(std::min<double>(gap_px, GapClosing::widest_px))));

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <decant/core/image.hpp>
@@ -76,11 +77,19 @@ class Splatter {
   /// share the rows like the teeth of combs, which balances them wherever the liquid is; each row is one thread's own.
   template <class DrawRow>
   void draw(ImageView<float>& image, Threads threads, DrawRow&& draw_row) const noexcept {
+    draw(image, PixelBox::of(image), threads, std::forward<DrawRow>(draw_row));
+  }
+
+  /// The same for an image that is zero outside of `stale`, a box that lies on it.
+  template <class DrawRow>
+  void draw(ImageView<float>& image, const PixelBox& stale, Threads threads, DrawRow&& draw_row) const noexcept {
     const Index combs =
         std::min<Index>(threads.resolved(), 1 + static_cast<Index>(footprints_.size()) / least_per_thread);
     parallel_ranges(combs, threads, 1, [&](Index comb, Index) {
-      for (Index v = comb; v < image.rows(); v += combs) {
-        image.row(v).setZero();
+      for (Index v = comb; v < stale.v_end; v += combs) {
+        if (v >= stale.v_begin) {
+          std::fill(&image(v, 0) + stale.u_begin, &image(v, 0) + stale.u_end, 0.0f);
+        }
       }
       const int step = static_cast<int>(combs);
       const int offset = static_cast<int>(comb);
