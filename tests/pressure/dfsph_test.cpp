@@ -23,7 +23,7 @@ namespace {
 
 /// A ball, its places scaled, with the velocity flow * x.
 template <class Scalar>
-auto ball(double scale, const Eigen::Matrix3d& flow = Eigen::Matrix3d::Zero()) {
+auto dense_ball(double scale, const Eigen::Matrix3d& flow = Eigen::Matrix3d::Zero()) {
   auto liquid = loose_ball<CubicSpline<Scalar>>(Scalar(0.005), 6, 0.1, 0);
   liquid.place(static_cast<Scalar>(scale) * liquid.fluid.position);
   for (Index i = 0; i < liquid.fluid.size(); ++i) {
@@ -63,7 +63,7 @@ double compression_by_velocities(const Liquid& liquid) {
 }
 
 template <class Scalar, class Liquid>
-PressureReport solve(Dfsph<Scalar>& solver, Liquid& liquid) {
+PressureReport solve_velocities(Dfsph<Scalar>& solver, Liquid& liquid) {
   PressureReport report;
   solver.begin_frame();
   solver.begin_step(liquid.view(), report);
@@ -72,7 +72,7 @@ PressureReport solve(Dfsph<Scalar>& solver, Liquid& liquid) {
 }
 
 template <class Scalar, class Liquid>
-PressureReport correct(Dfsph<Scalar>& solver, Liquid& liquid) {
+PressureReport solve_places(Dfsph<Scalar>& solver, Liquid& liquid) {
   PressureReport report;
   solver.begin_frame();
   solver.begin_step(liquid.view(), report);
@@ -84,12 +84,12 @@ PressureReport correct(Dfsph<Scalar>& solver, Liquid& liquid) {
 
 TEMPLATE_TEST_CASE("Dfsph: velocities no longer compress liquid at rest density, and momentum is kept", "", float,
                    double) {
-  auto liquid = ball<TestType>(0.98, -20 * Eigen::Matrix3d::Identity());  // 6 % in a sub-step of 1 ms
+  auto liquid = dense_ball<TestType>(0.98, -20 * Eigen::Matrix3d::Identity());  // 6 % in a sub-step of 1 ms
   liquid.fluid.velocity.row(0).array() += TestType(0.3);
   const Vector3<double> before = momentum(liquid);
   CHECK(compression_by_velocities(liquid) > 0.02);
   Dfsph<TestType> solver;
-  const PressureReport report = solve(solver, liquid);
+  const PressureReport report = solve_velocities(solver, liquid);
   CHECK(report.converged);
   CHECK(report.divergence_error <= 1e-4);
   // the mean of the report is over all particles, of which a third is loose
@@ -107,10 +107,10 @@ TEMPLATE_TEST_CASE("Dfsph: shear, rotation and expansion meet no pressure", "", 
   turn << 0, -20, 5, 20, 0, -10, -5, 10, 0;
   expansion << 10, 0, 0, 0, 5, 0, 0, 0, 20;
   for (const Eigen::Matrix3d& flow : {shear, turn, expansion}) {
-    auto liquid = ball<TestType>(0.98, flow);
+    auto liquid = dense_ball<TestType>(0.98, flow);
     const PointArray<TestType> before = liquid.fluid.velocity;
     Dfsph<TestType> solver;
-    const PressureReport report = solve(solver, liquid);
+    const PressureReport report = solve_velocities(solver, liquid);
     CHECK(report.converged);
     // gradients are kept to one part in 4,000; the ball's edge moves at 0.6 m/s
     CHECK((liquid.fluid.velocity - before).cwiseAbs().maxCoeff() < 2e-3);
@@ -120,7 +120,7 @@ TEMPLATE_TEST_CASE("Dfsph: shear, rotation and expansion meet no pressure", "", 
 namespace {
 
 template <class Liquid>
-double mean_compression(const Liquid& liquid) {
+double over_dense(const Liquid& liquid) {
   double total = 0;
   for (Index i = 0; i < liquid.fluid.size(); ++i) {
     total += std::max(0.0, static_cast<double>(liquid.fluid.density[i] / liquid.rest_density) - 1);
@@ -131,11 +131,11 @@ double mean_compression(const Liquid& liquid) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("Dfsph: what is too dense moves apart, and gains no speed", "", float, double) {
-  auto liquid = ball<TestType>(0.99);
-  const double before = mean_compression(liquid);
+  auto liquid = dense_ball<TestType>(0.99);
+  const double before = over_dense(liquid);
   CHECK(before > 0.02);
   Dfsph<TestType> solver;
-  const PressureReport report = correct(solver, liquid);
+  const PressureReport report = solve_places(solver, liquid);
   CHECK(report.converged);
   CHECK(report.density_error <= 1e-3);
   CHECK(liquid.fluid.velocity.isZero(0));
@@ -148,5 +148,5 @@ TEMPLATE_TEST_CASE("Dfsph: what is too dense moves apart, and gains no speed", "
   liquid.fluid.position += PointArray<TestType>(liquid.shift);
   liquid.update();
   // the formula is linear in the shift, so what it leaves is of second order
-  CHECK(mean_compression(liquid) < 0.1 * before);
+  CHECK(over_dense(liquid) < 0.1 * before);
 }
