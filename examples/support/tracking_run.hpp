@@ -215,17 +215,13 @@ std::vector<double> initial_ml_of(Follower& follower) {
 }
 
 /// Liquid in each watched container now [m^3], by body; expected, where there are several hypotheses.
-template <class Model, class CorrectorType>
-std::map<decant::BodyId, double> contents_of(decant::Tracker<Model, CorrectorType>& tracker) {
+template <class Follower>
+std::map<decant::BodyId, double> contents_of(Follower& follower) {
   std::map<decant::BodyId, double> volume;
-  for (const auto& contained : tracker.model().step(0).contents) {
+  for (const auto& contained : tracker_of(follower).model().step(0).contents) {
     volume[contained.body] = contained.volume;
   }
   return volume;
-}
-template <class TrackerType>
-std::map<decant::BodyId, double> contents_of(decant::FixedLagTracker<TrackerType>& follower) {
-  return contents_of(follower.tracker());
 }
 template <class TrackerType>
 std::map<decant::BodyId, double> contents_of(decant::HypothesisFilter<TrackerType>& follower) {

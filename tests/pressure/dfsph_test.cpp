@@ -62,21 +62,13 @@ double compression_by_velocities(const Liquid& liquid) {
   return total / counted;
 }
 
-template <class Scalar, class Liquid>
-PressureReport solve_velocities(Dfsph<Scalar>& solver, Liquid& liquid) {
+/// One sub-step's part of a solver that remembers nothing: solve or correct_places.
+template <class Solver, class Liquid, class Part>
+PressureReport report_of(Solver& solver, Liquid& liquid, Part&& part) {
   PressureReport report;
   solver.begin_frame();
   solver.begin_step(liquid.view(), report);
-  solver.solve(liquid.view(), report);
-  return report;
-}
-
-template <class Scalar, class Liquid>
-PressureReport solve_places(Dfsph<Scalar>& solver, Liquid& liquid) {
-  PressureReport report;
-  solver.begin_frame();
-  solver.begin_step(liquid.view(), report);
-  solver.correct_places(liquid.view(), report);
+  part(liquid.view(), report);
   return report;
 }
 
@@ -89,7 +81,8 @@ TEMPLATE_TEST_CASE("Dfsph: velocities no longer compress liquid at rest density,
   const Vector3<double> before = momentum(liquid);
   CHECK(compression_by_velocities(liquid) > 0.02);
   Dfsph<TestType> solver;
-  const PressureReport report = solve_velocities(solver, liquid);
+  const PressureReport report =
+      report_of(solver, liquid, [&](const auto& step, PressureReport& taken) { solver.solve(step, taken); });
   CHECK(report.converged);
   CHECK(report.divergence_error <= 1e-4);
   // the mean of the report is over all particles, of which a third is loose
@@ -110,7 +103,8 @@ TEMPLATE_TEST_CASE("Dfsph: shear, rotation and expansion meet no pressure", "", 
     auto liquid = dense_ball<TestType>(0.98, flow);
     const PointArray<TestType> before = liquid.fluid.velocity;
     Dfsph<TestType> solver;
-    const PressureReport report = solve_velocities(solver, liquid);
+    const PressureReport report =
+        report_of(solver, liquid, [&](const auto& step, PressureReport& taken) { solver.solve(step, taken); });
     CHECK(report.converged);
     // gradients are kept to one part in 4,000; the ball's edge moves at 0.6 m/s
     CHECK((liquid.fluid.velocity - before).cwiseAbs().maxCoeff() < 2e-3);
@@ -135,7 +129,8 @@ TEMPLATE_TEST_CASE("Dfsph: what is too dense moves apart, and gains no speed", "
   const double before = over_dense(liquid);
   CHECK(before > 0.02);
   Dfsph<TestType> solver;
-  const PressureReport report = solve_places(solver, liquid);
+  const PressureReport report =
+      report_of(solver, liquid, [&](const auto& step, PressureReport& taken) { solver.correct_places(step, taken); });
   CHECK(report.converged);
   CHECK(report.density_error <= 1e-3);
   CHECK(liquid.fluid.velocity.isZero(0));

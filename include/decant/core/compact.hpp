@@ -47,21 +47,20 @@ template <std::floating_point Scalar>
 /// Writes all lanes to consecutive compact numbers. A number and its negative stay each other's negative.
 template <std::floating_point Scalar>
 [[gnu::always_inline]] inline void store_compact(Batch<Scalar> batch, Compact<Scalar>* to) noexcept {
-  using B = Batch<Scalar>;
   if constexpr (std::is_same_v<Compact<Scalar>, Scalar>) {
     batch.store(to);
   } else {
 #if defined(__AVX512F__)
-    if constexpr (B::width == 16) {
+    if constexpr (Batch<Scalar>::width == 16) {
       constexpr int to_nearest = _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC;
       _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_maskz_cvtps_ph(0xffff, batch.v, to_nearest));
       return;
     }
 #endif
 #if defined(__F16C__)
-    if constexpr (B::width == 8) {
+    if constexpr (Batch<Scalar>::width == 8) {
       _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm256_cvtps_ph(batch.v, _MM_FROUND_TO_NEAREST_INT));
-    } else if constexpr (B::width == 4) {
+    } else if constexpr (Batch<Scalar>::width == 4) {
       _mm_storel_epi64(reinterpret_cast<__m128i*>(to), _mm_cvtps_ph(batch.v, _MM_FROUND_TO_NEAREST_INT));
     }
 #endif
