@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 # What a reader may rely on in every header under INCLUDE, checked by text:
 # - only io/ opens files or prints; only core/parallel.hpp speaks OpenMP; only neighbor/kd_tree.hpp includes nanoflann;
-# - #pragma once, an SPDX line, no `using namespace`, no macros but DECANT_*.
+# - #pragma once, an SPDX line, no `using namespace`, no macros but DECANT_*;
+# - all of decant is in the inline namespace DECANT_TARGET, whose name core/target.hpp finds.
 cmake_minimum_required(VERSION 3.22)
 
 file(GLOB_RECURSE headers RELATIVE "${INCLUDE}" "${INCLUDE}/*.hpp")
@@ -39,10 +40,16 @@ foreach(header IN LISTS headers)
     forbid(${header} "${text}" "# *include *[<\"]nanoflann[^\n]*" "nanoflann stays behind neighbor/kd_tree.hpp")
   endif()
   forbid(${header} "${text}" "\n *using +namespace[^\n]*" "a header must not open a namespace for its readers")
-  if(header MATCHES "^decant/(version|core/parallel)\\.hpp$")
+  if(NOT header STREQUAL "decant/core/target.hpp")
+    forbid(${header} "${text}" "\nnamespace +decant(::[a-z_:]*)? *{" "write namespace decant::DECANT_TARGET")
+  endif()
+  if(text MATCHES "DECANT_TARGET" AND NOT text MATCHES "# *include *<decant/core/target.hpp>|# *define +DECANT_TARGET")
+    string(APPEND complaints "\n  ${header}: DECANT_TARGET without #include <decant/core/target.hpp>")
+  endif()
+  if(header MATCHES "^decant/(version|core/parallel|core/target)\\.hpp$")
     forbid(${header} "${text}" "# *define +([^D]|D[^E]|DE[^C])[^\n]*" "macros begin with DECANT_")
   else()
-    forbid(${header} "${text}" "# *define +[^\n]*" "macros stand in version.hpp and core/parallel.hpp only")
+    forbid(${header} "${text}" "# *define +[^\n]*" "macros stand in version.hpp, core/parallel.hpp and core/target.hpp only")
   endif()
 endforeach()
 

@@ -8,9 +8,10 @@
 #include <decant/boundary/shapes.hpp>
 #include <decant/boundary/solid_parts.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A body's shape: its surface, and its solids where it is put together from simple ones (then wall integrals are in
 /// closed form; the surface is used for swept contact, sight lines and pictures).
@@ -70,4 +71,4 @@ struct BodyShape {
   BodyShape(const Bowl& bowl) : mesh(bowl.mesh()) {}
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

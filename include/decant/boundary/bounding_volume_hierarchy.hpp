@@ -22,9 +22,10 @@
 #include <decant/boundary/detail/segment_triangle.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 namespace detail {
 
@@ -690,4 +691,4 @@ inline bool BoundingVolumeHierarchy::inside_material(const Vector3<double>& x) c
   return votes_inside > votes_outside;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -19,9 +19,10 @@
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// The region of a body that holds liquid when `up` (in the body's frame) is up: of all places that keep liquid below
 /// their own rim, the one that holds most. A closed hollow counts as a whole; it is chosen if no open place holds a
@@ -527,4 +528,4 @@ inline void Cavity::choose(const Pieces& pieces) {
   }
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,9 +13,10 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Names a body of a simulation; as an Origin, the liquid that started in it.
 using BodyId = std::uint32_t;
@@ -85,4 +86,4 @@ concept Boundary =
       { built.guard(position, number, threads, sampled, fluid) } noexcept -> std::same_as<GuardReport>;
     };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

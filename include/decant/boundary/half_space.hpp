@@ -8,8 +8,9 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Integrals of a smoothing kernel over the half-space behind a plane, as functions of the particle's distance a [m] to
 /// that plane (negative behind it). With the wall taken as filled to rest density, fraction(a) is its share of a
@@ -93,4 +94,4 @@ class HalfSpace {
   std::vector<double> slope_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -17,9 +17,10 @@
 #include <decant/boundary/mesh_report.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What repair did.
 struct RepairReport {
@@ -238,4 +239,4 @@ inline TriangleMesh repaired(const TriangleMesh& mesh, double spacing) {
   return repaired(mesh, spacing, report);
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

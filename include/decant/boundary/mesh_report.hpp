@@ -20,9 +20,10 @@
 #include <decant/boundary/detail/mesh_topology.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Findings about a mesh. Edges are counted after vertices at equal places were merged.
 struct MeshReport {
@@ -249,4 +250,4 @@ inline MeshReport inspect(const TriangleMesh& mesh, double spacing, const Vector
   return report;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

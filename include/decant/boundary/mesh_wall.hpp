@@ -18,9 +18,10 @@
 #include <decant/boundary/wall_sample.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What lies in the shadow of a mesh: the integral of the wall's weight (WallFunction) over all points that the surface
 /// hides from the particle. Along a ray in direction u that meets the surface at distance t, the radial part is known
@@ -444,4 +445,4 @@ class MeshWall {
   std::vector<std::unique_ptr<Block>> block_data_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,9 +13,10 @@
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/detail/segment_triangle.hpp>
 #include <decant/core/batch.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// `Count` directions, a multiple of 8, that are asked for together again and again. first_hits answers what
 /// BoundingVolumeHierarchy::first_hit does for each ray, several times as fast where rays are short: the triangles
@@ -299,4 +300,4 @@ class RayFan {
   std::array<double, padded_count> cosine_{}, sine_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

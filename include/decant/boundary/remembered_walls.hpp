@@ -13,9 +13,10 @@
 #include <decant/core/growable.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Where particles and bodies were when a WallState was sampled last. Bodies without sample_again (boundary/concept.hpp
 /// does not ask for it) are sampled from the beginning each time; results are the same bits either way.
@@ -91,4 +92,4 @@ class RememberedWalls {
   Growable<Scalar, 3> position_before_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -31,10 +31,11 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A set of rigid bodies, each with a pose at any time.
 /// MeshWallType decides how the liquid feels meshes: MeshWall (shadow integrals) or SampledWall (boundary particles).
@@ -451,4 +452,4 @@ class RigidBodies {
 static_assert(Boundary<RigidBodies<float>, CubicSpline<float>>);
 static_assert(Boundary<RigidBodies<double>, CubicSpline<double>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

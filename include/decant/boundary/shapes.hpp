@@ -18,9 +18,10 @@
 
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A side of a box; of a cylinder along z, only the last two.
 enum class Face { NegativeX, PositiveX, NegativeY, PositiveY, NegativeZ, PositiveZ };
@@ -430,4 +431,4 @@ struct Bowl {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -10,9 +10,10 @@
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Takes out of a neighbour list the pairs that a body's wall separates. Few pairs near walls are,
 /// so what walls do to particles (WallState) answers two cheap questions first, a batch of neighbours at a time: a pair
@@ -104,4 +105,4 @@ class WallShield {
   std::vector<Scalar> wall_{};  ///< records of four: gradient of the share, distance
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

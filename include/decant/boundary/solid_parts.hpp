@@ -14,15 +14,16 @@
 #include <decant/boundary/wall_function.hpp>
 #include <decant/boundary/wall_sample.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// The surface point of a solid that is closest to a given point.
 struct SurfacePoint {
-  double distance = 0;                                 ///< [m], negative inside of the solid
-  Vector3<double> normal = Vector3<double>::UnitZ();   ///< unit length, out of the solid at that point
-  Vector3<double> point = Vector3<double>::Zero();     ///< [m]
+  double distance = 0;                                ///< [m], negative inside of the solid
+  Vector3<double> normal = Vector3<double>::UnitZ();  ///< unit length, out of the solid at that point
+  Vector3<double> point = Vector3<double>::Zero();    ///< [m]
 };
 
 /// Axis-aligned box.
@@ -79,8 +80,8 @@ struct SolidRing {
           {bottom - x[2], -Vector3<double>::UnitZ()},
           {x[2] - top, Vector3<double>::UnitZ()},
       }};
-      const auto face = std::max_element(faces.begin(), faces.end(),
-                                         [](const auto& a, const auto& b) { return a.first < b.first; });
+      const auto face =
+          std::max_element(faces.begin(), faces.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
       result.distance = face->first;
       result.normal = face->second;
     }
@@ -170,4 +171,4 @@ class SolidParts {
   double blend_ = 0;  ///< how far a part must stand out of another's plane to count in full [m]
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -4,9 +4,10 @@
 /// The last guard of a container: no particle's path may cross a wall, however thin the wall and however fast it moves.
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a path needed in order to stay on its side.
 enum class SweptResult {
@@ -49,4 +50,4 @@ inline SweptResult keep_on_side(const BoundingVolumeHierarchy& surface, const Ve
   return result;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

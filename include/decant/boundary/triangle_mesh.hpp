@@ -15,9 +15,10 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Triangles over shared vertices, in the frame of the body they belong to. A triangle's front is where its corners
 /// run counter-clockwise; on the surface of a solid the front looks out of the material.
@@ -148,4 +149,4 @@ inline TriangleMesh welded(const TriangleMesh& mesh) {
   return result;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,8 +7,9 @@
 #include <cmath>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A wall takes part in the density sum as a region behind its surface, with a weight of its own instead of the kernel.
 /// At distance a from a plane it adds, in units of rest density,
@@ -119,4 +120,4 @@ class WallFunction {
   double power_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

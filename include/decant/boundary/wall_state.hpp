@@ -9,9 +9,10 @@
 #include <vector>
 
 #include <decant/core/growable.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A wall's part in one particle's sums. Gradients are those of the share, so they point into the wall.
 template <class Scalar>
@@ -66,4 +67,4 @@ struct WallState {
   WallContact<Scalar>* contacts_of(Index i) { return &contacts[static_cast<std::size_t>(i) * max_contacts]; }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -9,8 +9,9 @@
 #include <Eigen/LU>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// x -> A x + b from one image's pixels to another's; always invertible. Named like a pose, image_from_thermal: the
 /// recording format's affine_to_image takes a thermal pixel (u, v) to the colour image's pixel.
@@ -66,4 +67,4 @@ class AffineMap {
   Matrix matrix_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

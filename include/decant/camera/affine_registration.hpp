@@ -15,9 +15,10 @@
 
 #include <decant/camera/affine_map.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 struct AffineFitSettings {
   bool refuse_outliers = true;  ///< false: least squares over all pairs
@@ -260,4 +261,4 @@ inline Index affine_fit_check(const Points2& from, const Points2& to, const Affi
   return fit;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,9 +7,10 @@
 
 #include <Eigen/Core>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Where a point falls in an image.
 struct Projection {
@@ -68,4 +69,4 @@ inline bool before_camera(const Vector3<double>& x) noexcept {
 
 }  // namespace detail
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

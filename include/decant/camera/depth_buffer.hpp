@@ -21,9 +21,10 @@
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// An image of depths along the optical axis [m]. Per frame: clear(), then draw() every body that cannot be looked
 /// through; or accept() an image. Both allocate nothing.
@@ -291,4 +292,4 @@ class DepthBuffer {
 };
 static_assert(Occlusion<DepthBuffer<PinholeCamera>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -10,8 +10,9 @@
 #include <decant/camera/concept.hpp>
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Coefficients of the lens model "plumb_bob" (D. C. Brown 1966; J.-Y. Bouguet's calibration toolbox), in the order of
 /// OpenCV's and ROS's arrays. All are without unit.
@@ -192,4 +193,4 @@ class DistortedPinholeCamera {
 };
 static_assert(CameraModel<DistortedPinholeCamera>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -4,9 +4,10 @@
 /// For scenes in which nothing stands before the liquid, or in which all of it is transparent.
 
 #include <decant/camera/occlusion_concept.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Nothing is hidden.
 struct NoOcclusion {
@@ -14,4 +15,4 @@ struct NoOcclusion {
 };
 static_assert(Occlusion<NoOcclusion>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -12,9 +12,10 @@
 #include <Eigen/Core>
 
 #include <decant/core/image.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A split of pixel values in two.
 struct OtsuThreshold {
@@ -112,4 +113,4 @@ std::optional<OtsuThreshold> otsu_threshold(const Eigen::ArrayBase<Derived>& ima
   return histogram.otsu();
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,8 +7,9 @@
 
 #include <decant/camera/concept.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Central projection: u = fx x/z + cx, v = fy y/z + cy.
 class PinholeCamera {
@@ -65,4 +66,4 @@ class PinholeCamera {
 };
 static_assert(CameraModel<PinholeCamera>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

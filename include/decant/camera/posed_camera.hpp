@@ -9,9 +9,10 @@
 #include <decant/camera/concept.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A camera in the world: answers a camera's questions for points in world coordinates. A value, as the camera is; all
 /// const functions may be called from any thread, and none but the constructor throws or allocates.
@@ -76,4 +77,4 @@ class PosedCamera {
   Matrix3<double> rotation_ = Matrix3<double>::Identity();  // of camera_from_world_, ready for many points
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -24,9 +24,10 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Sight lines against bounding-volume hierarchies (Schenck and Fox 2017, section IV). Rays go into each body's frame,
 /// so a body that moves costs a pose and nothing is built anew. Exact for every camera; surfaces hide from both sides.
@@ -250,4 +251,4 @@ class RayOcclusion {
 };
 static_assert(Occlusion<RayOcclusion<PinholeCamera>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -16,9 +16,10 @@
 #include <decant/camera/affine_map.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What thermal cameras deliver: raw counts of 8 or 16 bits, or temperatures.
 template <class P>
@@ -163,4 +164,4 @@ class ThermalLabel {
   AffineMap thermal_from_image_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -18,7 +18,9 @@
 #include <immintrin.h>
 #endif
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 namespace detail {
 
@@ -658,4 +660,4 @@ template <std::floating_point Scalar>
   return detail::compress_bits<Scalar>(to, from, mask.bits());
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

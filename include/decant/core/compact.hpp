@@ -8,8 +8,9 @@
 #include <type_traits>
 
 #include <decant/core/batch.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 #if defined(__AVX512F__) || defined(__F16C__)
 inline constexpr bool has_half_precision = true;
@@ -67,4 +68,4 @@ template <std::floating_point Scalar>
   }
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

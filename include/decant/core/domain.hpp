@@ -10,9 +10,10 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Ordinary space.
 struct OpenDomain {
@@ -91,4 +92,4 @@ class PeriodicDomain {
   Vector3<Scalar> inverse_ = Vector3<Scalar>::Zero();
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

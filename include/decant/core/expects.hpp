@@ -8,7 +8,9 @@
 #include <string>
 #include <string_view>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 namespace detail {
 
@@ -32,4 +34,4 @@ void expects(bool holds, std::string_view what, std::string_view expected, const
   }
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

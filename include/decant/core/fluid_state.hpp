@@ -7,9 +7,10 @@
 #include <cstdint>
 
 #include <decant/core/growable.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Where a particle came from: the number of a body it was filled into or of an inlet, as the simulation handed it out.
 using Origin = std::uint32_t;
@@ -56,4 +57,4 @@ struct FluidState {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

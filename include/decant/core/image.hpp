@@ -8,7 +8,9 @@
 
 #include <Eigen/Core>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 /// An image that owns its pixels.
 template <class T>
@@ -34,4 +36,4 @@ inline constexpr std::uint8_t mask_liquid = 255;  ///< what decant writes where 
 /// reads as one.
 constexpr bool is_liquid(std::uint8_t value) noexcept { return value >= 128; }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,9 +13,10 @@
 #include <omp.h>
 #endif
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// How many threads a call may use; 0 means all that the machine offers.
 struct Threads {
@@ -97,4 +98,4 @@ class Reduction {
   std::vector<Value> partial_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

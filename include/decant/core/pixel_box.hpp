@@ -5,7 +5,9 @@
 
 #include <algorithm>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 /// Columns [u_begin, u_end) and rows [v_begin, v_end) [px]; empty by default.
 struct PixelBox {
@@ -43,4 +45,4 @@ struct PixelBox {
   bool operator==(const PixelBox&) const = default;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

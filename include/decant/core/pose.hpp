@@ -8,9 +8,10 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Takes points of the body's frame to the world: x_in_world = rotation * x_in_body + translation.
 struct Pose {
@@ -35,9 +36,7 @@ struct RigidVelocity {
   Vector3<double> angular = Vector3<double>::Zero();  ///< [rad/s], world frame
   Vector3<double> center = Vector3<double>::Zero();   ///< [m], the body frame's origin in the world
 
-  Vector3<double> at(const Vector3<double>& x_in_world) const {
-    return linear + angular.cross(x_in_world - center);
-  }
+  Vector3<double> at(const Vector3<double>& x_in_world) const { return linear + angular.cross(x_in_world - center); }
 };
 
 /// Pose between two others: translation linear, rotation by SLERP along the shorter arc. fraction 0 gives a, 1 gives b.
@@ -56,8 +55,8 @@ inline RigidVelocity velocity_between(const Pose& before, const Pose& after, dou
   RigidVelocity velocity;
   velocity.linear = (after.translation - before.translation) / time_step;
   // for tiny turns sin(a/2)/a tends to 1/2; the quotient below would be 0/0
-  velocity.angular = (sine > 1e-12 ? Vector3<double>(turn.vec() * (angle / sine)) : Vector3<double>(2 * turn.vec())) /
-                     time_step;
+  velocity.angular =
+      (sine > 1e-12 ? Vector3<double>(turn.vec() * (angle / sine)) : Vector3<double>(2 * turn.vec())) / time_step;
   velocity.center = before.translation;
   return velocity;
 }
@@ -119,4 +118,4 @@ class PoseTrack {
   std::vector<Sample> samples_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -6,7 +6,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 using Index = Eigen::Index;
 
@@ -31,4 +33,4 @@ using PointsView = Eigen::Ref<PointArray<Scalar>>;
 template <class Scalar>
 using ConstPointsView = Eigen::Ref<const PointArray<Scalar>>;
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -6,9 +6,10 @@
 #include <concepts>
 
 #include <decant/core/fluid_state.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a correction did.
 struct CorrectionReport {
@@ -33,4 +34,4 @@ concept Corrector = requires(C& corrector, FluidState<typename C::Scalar>& fluid
   { corrector.reset() } noexcept;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

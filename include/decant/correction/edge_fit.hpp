@@ -15,11 +15,12 @@
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/detail/mask_disagreement.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of EdgeFit.
 struct EdgeFitSettings {
@@ -241,4 +242,4 @@ class EdgeFit {
 };
 static_assert(Corrector<EdgeFit<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,12 +13,13 @@
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of MapFilter.
 struct MapFilterSettings {
@@ -39,8 +40,8 @@ struct MapFilterSettings {
 /// with E the distance in the image to observed liquid, cut off at the reach, and U the share of unexplained liquid
 /// (observed, not predicted) around it, weighed by exp(-(d / length)^2). If prediction and observation agree, E and U
 /// are zero where the particles are, and all of them stay. Several passes, each drawn anew, from coarse to fine.
-/// Particles that no camera sees stay, and none is taken out of a picture that shows it; of equal hypotheses the nearest
-/// wins.
+/// Particles that no camera sees stay, and none is taken out of a picture that shows it; of equal hypotheses the
+/// nearest wins.
 template <class ScalarType = float, class CameraType = DistortedPinholeCamera>
 class MapFilter {
  public:
@@ -201,4 +202,4 @@ class MapFilter {
 };
 static_assert(Corrector<MapFilter<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

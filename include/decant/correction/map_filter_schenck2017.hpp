@@ -10,12 +10,13 @@
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of MapFilterSchenck2017.
 struct MapFilterSchenck2017Settings {
@@ -119,4 +120,4 @@ class MapFilterSchenck2017 {
 };
 static_assert(Corrector<MapFilterSchenck2017<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -15,12 +15,13 @@
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/detail/liquid_box.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of MassRelocation. Pixels are those of the image.
 struct MassRelocationSettings {
@@ -354,4 +355,4 @@ class MassRelocation {
 };
 static_assert(Corrector<MassRelocation<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -4,10 +4,11 @@
 /// The corrector that leaves the simulation alone: what all others are compared with.
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 template <class ScalarType = float, class CameraType = DistortedPinholeCamera>
 struct OpenLoop {
@@ -19,4 +20,4 @@ struct OpenLoop {
 };
 static_assert(Corrector<OpenLoop<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -16,10 +16,11 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/coverage/detail/liquid_box.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of SilhouetteTransport. Lengths are in pixels of the image.
 struct SilhouetteTransportSettings {
@@ -348,4 +349,4 @@ class SilhouetteTransport {
   Index nodes_x_ = 0, nodes_y_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

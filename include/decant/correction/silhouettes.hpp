@@ -11,9 +11,10 @@
 #include <decant/camera/ray_occlusion.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// One camera in one frame. Owns nothing; images are the camera's height x width.
 template <class CameraType>
@@ -42,4 +43,4 @@ struct Silhouettes {
   Threads threads{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

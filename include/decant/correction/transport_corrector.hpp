@@ -9,11 +9,12 @@
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouette_transport.hpp>
 #include <decant/correction/silhouettes.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// One pass of TransportCorrector.
 struct TransportPass {
@@ -165,4 +166,4 @@ class TransportCorrector {
 };
 static_assert(Corrector<TransportCorrector<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

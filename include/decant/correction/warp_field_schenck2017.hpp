@@ -9,6 +9,7 @@
 
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/image_kernel.hpp>
@@ -17,7 +18,7 @@
 #include <decant/neighbor/cell_grid.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of WarpFieldSchenck2017.
 struct WarpFieldSchenck2017Settings {
@@ -116,4 +117,4 @@ class WarpFieldSchenck2017 {
 };
 static_assert(Corrector<WarpFieldSchenck2017<>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,9 +13,10 @@
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Which pixels of a mask a distance leads to.
 enum class MaskPart { Liquid, Background };
@@ -149,4 +150,4 @@ class SilhouetteDistance {
   std::vector<Parabola> envelopes_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -11,9 +11,10 @@
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// One symmetric matrix L_i per particle, close to the inverse of
 ///   A_i = sum_j V_j (-W'/r) r r^T + sum over walls of |grad s| a n n^T,    r = x_i - x_j
@@ -137,4 +138,4 @@ class GradientCorrection {
   std::vector<Scalar> first_{}, second_{};  ///< records of four: xx, xy, xz and yy, yz, zz, the last one unused
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -5,9 +5,10 @@
 
 #include <limits>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// The same acceleration for every particle.
 template <class ScalarType>
@@ -27,4 +28,4 @@ struct Gravity {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

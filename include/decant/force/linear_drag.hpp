@@ -7,9 +7,10 @@
 #include <limits>
 
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// a = -rate (v - medium): a stand-in for what takes speed out of liquid and is not resolved, such as the air around
 /// a jet that breaks up. Taken over a sub-step as a whole, so that speed falls as exp(-rate t) however long sub-steps
@@ -36,4 +37,4 @@ struct LinearDrag {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

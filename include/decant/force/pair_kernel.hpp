@@ -8,9 +8,10 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Slopes that forces and pressure take gradients from, and the densities that the kernel adds up to: with them,
 ///   grad W_ij = slope x_ij,   slope = W'(r) / r [m^-5]
@@ -56,4 +57,4 @@ class PairKernel {
   Scalar common_mass_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

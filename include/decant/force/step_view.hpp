@@ -9,11 +9,12 @@
 #include <decant/core/batch.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/pair_kernel.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Everything is as of the start of the sub-step: densities, neighbours and walls belong to fluid.position.
 /// Does not own what it refers to; valid during one sub-step.
@@ -43,4 +44,4 @@ struct StepView {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -9,10 +9,11 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/kernel/mueller_viscosity.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS): velocities enter as the sum
 /// v_i / rho_i^2 + v_j / rho_j^2 where friction needs their difference. With the Laplacian of Mueller's viscosity
@@ -84,4 +85,4 @@ struct ViscositySchenck2017 {
   std::vector<Scalar> records_{};  ///< v / rho^2, mass
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -22,6 +22,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/bop_json.hpp>
 #include <decant/io/detail/folder.hpp>
@@ -32,7 +33,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/recording_writer.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A BOP scene, and what BOP does not say about it.
 struct BopScene {
@@ -230,4 +231,4 @@ inline void write_bop(const Recording& recording, const std::filesystem::path& f
   detail::write_text_file(scene / "scene_gt.json", detail::scene_gt_text(images));
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -17,10 +17,11 @@
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/png.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// From where a picture is taken: a perspective view without distortion.
 struct PictureView {
@@ -402,4 +403,4 @@ class LiquidPainter {
   Picture picture_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -23,10 +23,11 @@
 #include <vector>
 
 #include <decant/boundary/triangle_mesh.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Formats of mesh files.
 enum class MeshFormat {
@@ -607,4 +608,4 @@ inline void write_mesh(const std::filesystem::path& path, const TriangleMesh& me
   detail::write_text_file(path, bytes);
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

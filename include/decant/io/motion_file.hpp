@@ -11,9 +11,10 @@
 #include <vector>
 
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A motion from text, in one of two forms:
 /// - header `t_s,x_m,y_m,z_m,qw,qx,qy,qz`, then one row per pose, separated by commas;
@@ -83,4 +84,4 @@ inline PoseTrack read_motion(const std::filesystem::path& path) {
   return parse_motion(detail::read_text_file(path, std::uintmax_t{1} << 28), path.string());
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

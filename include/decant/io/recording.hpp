@@ -21,13 +21,14 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/folder.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/png.hpp>
 #include <decant/simulation/inlet.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a recording is made of.
 namespace recording {
@@ -219,4 +220,4 @@ struct Recording {
   }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

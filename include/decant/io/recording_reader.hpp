@@ -22,6 +22,7 @@
 
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/bop_json.hpp>
 #include <decant/io/detail/folder.hpp>
@@ -32,7 +33,7 @@
 #include <decant/io/recording.hpp>
 #include <decant/io/series_file.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 namespace detail {
 
@@ -487,4 +488,4 @@ inline Recording detail::RecordingFolder::read() const {
 /// std::runtime_error, one line that names the file, the key or the frame, and what was expected.
 inline Recording read_recording(const std::filesystem::path& folder) { return detail::RecordingFolder(folder).read(); }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

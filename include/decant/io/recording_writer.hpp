@@ -19,6 +19,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/bop_json.hpp>
 #include <decant/io/detail/folder.hpp>
@@ -29,7 +30,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/series_file.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 namespace recording {
 
@@ -408,4 +409,4 @@ inline void write_recording(const std::filesystem::path& folder, const Recording
   writer.finish();
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -16,11 +16,12 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/png.hpp>
 #include <decant/io/table.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Lines over a common axis.
 struct LineChart {
@@ -571,4 +572,4 @@ follow_address();
   std::string script_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

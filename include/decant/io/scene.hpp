@@ -15,12 +15,13 @@
 
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/json.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/motion_file.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a scene is made of.
 namespace scene {
@@ -568,4 +569,4 @@ inline Scene read_scene(const std::filesystem::path& path) {
   return parse_scene(detail::read_text_file(path, std::uintmax_t{1} << 24), path.parent_path(), path.string());
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,9 +13,10 @@
 #include <string_view>
 #include <vector>
 
+#include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Named columns of equal length; a missing value is NaN. The first column is the time `t_s` [s].
 struct Series {
@@ -171,4 +172,4 @@ inline void write_series(const std::filesystem::path& path, const Series& series
   detail::write_text_file(path, series_text(series));
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 /// Rows of cells under a header; the first column is flush left, the others flush right.
 class Table {
@@ -63,4 +65,4 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -18,10 +18,11 @@
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 namespace detail {
 
@@ -207,4 +208,4 @@ class VtkSequence {
   std::size_t times_liquid_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -5,9 +5,10 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/domain.hpp>
+#include <decant/core/target.hpp>
 #include <decant/neighbor/concept.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Compares each particle with all others, in ascending order: N operations per particle.
 template <std::floating_point ScalarType, class DomainType = OpenDomain>
@@ -47,4 +48,4 @@ class BruteForce {
 
 static_assert(NeighborSearch<BruteForce<float>> && NeighborSearch<BruteForce<double, PeriodicDomain<double>>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -14,10 +14,11 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/domain.hpp>
+#include <decant/core/target.hpp>
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/detail/scratch.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A grid over the particles' bounding box, cells a little larger than the support radius, particles sorted by cell
 /// with x running fastest: three cells side by side are one contiguous run, and a particle's neighbours lie in nine
@@ -490,4 +491,4 @@ class CellGrid {
 
 static_assert(NeighborSearch<CellGrid<float>> && NeighborSearch<CellGrid<double, PeriodicDomain<double>>>);
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -8,9 +8,10 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Finds the particles near a particle. A plain value; it keeps what it needs of the positions, so the caller's array
 /// may change or vanish after rebuild.
@@ -56,4 +57,4 @@ void check_search(const Domain& domain, Index count, Scalar support_radius) {
 
 }  // namespace detail
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -16,11 +16,12 @@
 #include <decant/core/batch.hpp>
 #include <decant/core/domain.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/neighbor/cell_grid.hpp>
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/detail/scratch.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// One row per particle, neighbours in ascending order, filled up to whole batches with the particle's own index: there
 /// x_i - x_j is zero, so antisymmetric pair terms vanish and others are masked. Separations are written down beside the
@@ -463,4 +464,4 @@ class NeighborList {
   std::vector<std::size_t> needed_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -16,10 +16,11 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A sweep over neighbours carries information by one support radius, so that a deep column takes as many sweeps as it
 /// has layers. This finds in one go the best pressure that is constant within cells: with the matrix A of a
@@ -369,4 +370,4 @@ class CoarseCells {
   std::vector<double> matrix_{}, solution_{}, value_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

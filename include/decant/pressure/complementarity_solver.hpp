@@ -9,11 +9,12 @@
 #include <vector>
 
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/coarse_cells.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// How a solve went.
 struct ComplementarityReport {
@@ -292,4 +293,4 @@ class ComplementaritySolver {
   Reduction<double> reduction_of_sums_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

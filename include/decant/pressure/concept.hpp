@@ -7,9 +7,10 @@
 #include <cstdint>
 #include <span>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a solve took and reached.
 struct PressureReport {
@@ -50,4 +51,4 @@ concept PressureSolver =
       { P::search_margin } -> std::convertible_to<double>;
     };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

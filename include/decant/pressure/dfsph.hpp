@@ -11,13 +11,14 @@
 #include <vector>
 
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/complementarity_solver.hpp>
 #include <decant/pressure/concept.hpp>
 #include <decant/pressure/pressure_system.hpp>
 #include <decant/pressure/stable_step.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// After Bender and Koschier 2017, "Divergence-free SPH for incompressible and viscous fluids" (IEEE TVCG 23), with its
 /// two constraints, on the velocity's divergence and on the density. Each is a linear complementarity problem: pressure
@@ -247,4 +248,4 @@ class Dfsph {
   Reduction<Flag> flags_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -13,11 +13,12 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/concept.hpp>
 #include <decant/pressure/stable_step.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// After Macklin and Mueller 2013, "Position based fluids" (ACM TOG 32). With the constraint C_i = rho_i / rho_0 - 1 <=
 /// 0 of every particle at its predicted position x* = x + dt v, each sweep computes (eqs. 8, 9, 11, 12)
@@ -281,4 +282,4 @@ class PositionBased {
   Reduction<Compression> reduction_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

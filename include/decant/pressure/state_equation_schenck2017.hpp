@@ -11,10 +11,11 @@
 
 #include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/pressure/concept.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS), section on the simulator: the
 /// linear equation of state p = c^2 (rho - rho_0) and, with the acceleration f / rho, the force density
@@ -95,4 +96,4 @@ class StateEquationSchenck2017 {
   std::vector<Scalar> records_{};  ///< p / rho^2, volume, two unused
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

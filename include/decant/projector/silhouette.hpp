@@ -13,12 +13,13 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/projector/concept.hpp>
 #include <decant/projector/disc_splat.hpp>
 #include <decant/projector/gap_closing.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Writes mask_liquid where coverage is above zero, and 0 elsewhere. `drawn` is what Projector::render returned, or
 /// PixelBox::of(coverage). Both images are of one size.
@@ -94,4 +95,4 @@ class Silhouette {
   PixelBox drawn_{};  ///< outside of it coverage_ is zero
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

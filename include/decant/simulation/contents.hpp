@@ -8,10 +8,11 @@
 
 #include <decant/boundary/cavity.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/simulation/simulator.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// The space of one container, ready for many questions. Which liquid is in it is asked in the container's own frame:
 /// what is above the rim's plane is not, however the container is tilted.
@@ -59,4 +60,4 @@ class Contents {
   std::shared_ptr<const Cavity> cavity_;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

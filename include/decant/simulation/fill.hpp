@@ -16,10 +16,11 @@
 #include <decant/boundary/cavity.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/simulation/simulator.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// How much.
 struct FillAmount {
@@ -211,4 +212,4 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   return report;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

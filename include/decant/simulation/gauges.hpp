@@ -20,10 +20,11 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/neighbor/cell_grid.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Takes readings of particles at one instant: observe() first, then any number of readings. SI units, world frame, up
 /// is +z. Particles with non-finite coordinates are passed over.
@@ -379,4 +380,4 @@ class Gauges {
   CellGrid<double> flat_grid_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

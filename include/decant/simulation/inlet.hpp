@@ -10,9 +10,10 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What an inlet is asked to do.
 struct InletSettings {
@@ -99,4 +100,4 @@ class Inlet {
   std::vector<Vector3<double>> layer_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,8 +7,9 @@
 #include <string_view>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Bulk properties of a Newtonian liquid against air.
 struct Liquid {
@@ -54,4 +55,4 @@ inline constexpr Liquid milk{1030.0, 2.1e-3, 0.0524};
 
 }  // namespace liquids
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -24,6 +24,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/stopwatch.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/kernel/concept.hpp>
@@ -37,7 +38,7 @@
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A liquid simulation composed of Parts (see simulation/parts.hpp). Holds no global state: any number of differently
 /// composed simulators can live side by side. Not safe to call from several threads at once; copies are independent.
@@ -752,4 +753,4 @@ class Simulator {
 /// The ready-made simulator.
 using LiquidSimulator = Simulator<DefaultParts<>>;
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

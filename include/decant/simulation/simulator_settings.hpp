@@ -7,10 +7,11 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/simulation/liquid.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What every simulator needs to know, whatever its parts.
 struct SimulatorSettings {
@@ -68,4 +69,4 @@ inline void validate(const SimulatorSettings& settings) {
           settings.threads.count);
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -8,9 +8,10 @@
 #include <cstdint>
 #include <string_view>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 enum class StepStatus {
   Ok,
@@ -106,4 +107,4 @@ struct StepReport {
   bool advanced() const { return status == StepStatus::Ok || status == StepStatus::NotConverged; }
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -12,10 +12,11 @@
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// Tries the laws of a boundary around places of liquid.
 /// @param bodies with all bodies added; they are held where they are at time 0. Copied.
@@ -36,16 +37,16 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
   };
   const WallState<Scalar> walls = sampled(inside, 1);
   const bool sized = walls.share.count() == count && walls.gradient.count() == count && walls.moment.count() == count &&
-                     walls.flux.count() == count &&
-                     walls.distance.count() == count && walls.contact_count.count() == count;
+                     walls.flux.count() == count && walls.distance.count() == count &&
+                     walls.contact_count.count() == count;
   if (!sized || count == 0) {
     return {{"every array has an entry per particle, and there are particles (1 if not)", 1, 0}};
   }
   // over which gradients are compared [1/m]
   const double steepest = std::max(static_cast<double>(walls.gradient.colwise().norm().maxCoeff()), 1e-30);
 
-  const bool finite = walls.share.allFinite() && walls.gradient.allFinite() && walls.moment.allFinite() &&
-                      walls.flux.allFinite();
+  const bool finite =
+      walls.share.allFinite() && walls.gradient.allFinite() && walls.moment.allFinite() && walls.flux.allFinite();
   double touching = 0, not_zero = 0, not_the_sum = 0, moving = 0;
   for (Index i = 0; i < count; ++i) {
     Point sum = Point::Zero();
@@ -134,4 +135,4 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
   };
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

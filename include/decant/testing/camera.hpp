@@ -15,10 +15,11 @@
 #include <decant/camera/occlusion_concept.hpp>
 #include <decant/camera/posed_camera.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 namespace detail {
 
@@ -218,4 +219,4 @@ std::vector<Law> occlusion_laws(const OcclusionType& occlusion, const PosedCamer
   };
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

@@ -6,10 +6,11 @@
 #include <vector>
 
 #include <decant/core/fluid_state.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// Tries the laws of a corrector on copies of it and of a liquid, each with one call.
 /// @param nothing an observation of nothing (no camera had a mask). @param perfect one that is just what the liquid
@@ -49,4 +50,4 @@ std::vector<Law> corrector_laws(const CorrectorType& corrector,
   };
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

@@ -14,13 +14,14 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/growable.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/step_view.hpp>
 #include <decant/neighbor/brute_force.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// Liquid by itself with all that a StepView refers to, for trying forces and pressure solvers without a simulator.
 template <class KernelType>
@@ -209,4 +210,4 @@ std::vector<Law> force_laws(Force force, Keeps keeps) {
   return laws;
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

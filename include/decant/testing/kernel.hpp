@@ -10,10 +10,11 @@
 #include <type_traits>
 #include <vector>
 
+#include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// Tries the laws of a kernel at one smoothing length [m]; run it at several, since a wrong power of h hides at h = 1.
 /// Takes about a millisecond.
@@ -92,4 +93,4 @@ std::vector<Law> kernel_laws(typename Kernel::Scalar smoothing_length) {
   };
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

@@ -7,7 +7,9 @@
 #include <sstream>
 #include <string>
 
-namespace decant::testing {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET::testing {
 
 /// A law holds if `error` is at most `bound`; NaN does not hold.
 struct Law {
@@ -25,4 +27,4 @@ struct Law {
   }
 };
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

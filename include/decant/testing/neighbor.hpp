@@ -13,11 +13,12 @@
 #include <utility>
 #include <vector>
 
+#include <decant/core/target.hpp>
 #include <decant/neighbor/brute_force.hpp>
 #include <decant/neighbor/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// A cloud of particles that searches find hard, in units of a support radius of 1.
 template <class Scalar>
@@ -191,4 +192,4 @@ std::vector<Law> neighbor_laws(Search search) {
   return laws;
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

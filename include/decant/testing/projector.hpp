@@ -16,11 +16,12 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/projector/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::testing {
+namespace decant::DECANT_TARGET::testing {
 
 /// Tries the laws of a projector that draws one particle as something that covers at least one pixel when it fills
 /// some: spheres of millimetres, seen by a pinhole camera from 30 to 70 cm. Takes some milliseconds.
@@ -117,4 +118,4 @@ requires Projector<P, PinholeCamera> std::vector<Law> projector_laws(const P& co
   };
 }
 
-}  // namespace decant::testing
+}  // namespace decant::DECANT_TARGET::testing

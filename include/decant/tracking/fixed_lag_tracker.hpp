@@ -18,10 +18,11 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Something of a model that is not known exactly. What is expected is zero, give or take a deviation.
 template <class Model>
@@ -346,4 +347,4 @@ class FixedLagTracker {
   int since_adapted_ = 0;  ///< frames
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

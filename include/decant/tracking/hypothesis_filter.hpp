@@ -14,10 +14,11 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Settings of HypothesisFilter.
 struct HypothesisFilterSettings {
@@ -181,4 +182,4 @@ class HypothesisFilter {
   std::vector<Hypothesis> hypotheses_{};
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -9,9 +9,10 @@
 #include <decant/boundary/concept.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// A simulation of liquid among rigid bodies, decant's own or somebody else's. A simulation that keeps its particles in
 /// arrays of its own copies them into a FluidState after each step and back at the start of the next.
@@ -36,4 +37,4 @@ concept LiquidModel = requires(M& model, const M& asked, BodyId body, const Pose
   { model.step(duration).advanced() } -> std::same_as<bool>;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -6,10 +6,11 @@
 #include <cstdint>
 
 #include <decant/core/image.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/coverage/detail/liquid_box.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Liquid comes into sight and leaves it by and by, a segmentation fails from one frame to the next. So a mask with
 /// little liquid is believed where the last one that was believed showed little, too; at the start that is none.
@@ -35,4 +36,4 @@ class MaskTrust {
   Index last_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,9 +7,10 @@
 #include <limits>
 
 #include <decant/core/image.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// Pixel counts of a predicted and an observed mask of one size.
 struct Overlap {
@@ -101,4 +102,4 @@ inline Overlap overlap(const ConstMaskView& predicted, const ConstMaskView& obse
   });
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -7,9 +7,10 @@
 #include <limits>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 #include <decant/tracking/overlap.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 struct OverlapScoreSettings {
   /// Frames whose union is smaller are left out of the mean over frames, >= 1. A jet's first drops cover some ten
@@ -111,4 +112,4 @@ class RecordingsScore {
   std::int64_t recordings_left_out_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -21,6 +21,7 @@
 #include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/stopwatch.hpp>
+#include <decant/core/target.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
@@ -31,7 +32,7 @@
 #include <decant/tracking/mask_trust.hpp>
 #include <decant/tracking/overlap.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What a tracker needs to know beside its model and its corrector.
 struct TrackerSettings {
@@ -448,4 +449,4 @@ class Tracker {
   bool started_ = false;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

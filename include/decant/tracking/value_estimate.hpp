@@ -10,8 +10,9 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
 
-namespace decant {
+namespace decant::DECANT_TARGET {
 
 /// What is known of a quantity, in its unit.
 struct ValueEstimate {
@@ -90,4 +91,4 @@ inline ValueEstimate estimate_value(std::span<const double> values, std::span<co
   return estimate;
 }
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

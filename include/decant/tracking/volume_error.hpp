@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <limits>
 
-namespace decant {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET {
 
 /// Estimated against true volumes, over frames or over recordings. Amounts come in m^3, errors go out in millilitres,
 /// in which one pours. All are NaN as long as nothing was compared.
@@ -58,4 +60,4 @@ class VolumeError {
   double last_ = 0;
 };
 
-}  // namespace decant
+}  // namespace decant::DECANT_TARGET

@@ -14,9 +14,10 @@
 #include <vector>
 
 #include <decant/boundary/triangle_mesh.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// One side of one triangle.
 struct MeshEdge {
@@ -250,4 +251,4 @@ inline double span_width(const std::vector<Vector3<double>>& vertices, const std
   return 2 * std::sqrt(largest);
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -11,9 +11,10 @@
 #include <cstdint>
 #include <limits>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// A triangle of a surface, as a BoundingVolumeHierarchy keeps it.
 struct TreeTriangle {
@@ -202,4 +203,4 @@ inline TriangleCrossing cross(const TreeTriangle& triangle, const Vector3<double
   return crossing;
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -9,9 +9,10 @@
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 inline Eigen::Isometry3d isometry_of(const Pose& pose) noexcept {
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
@@ -42,4 +43,4 @@ inline std::optional<double> first_depth(const BoundingVolumeHierarchy& surface,
   return hit ? std::optional<double>(hit->fraction * limit) : std::nullopt;
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -19,9 +19,10 @@
 #include <decant/boundary/detail/segment_triangle.hpp>
 #include <decant/camera/concept.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// Two shortcuts that change no answer, for sight lines that begin at the origin of the camera's frame. One that ends
 /// before all that any body has in its part of the image meets nothing. And what is behind a wall is mostly in the
@@ -294,4 +295,4 @@ class SightMemory {
   Image<Hints> hints_;
 };
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -15,10 +15,11 @@
 #include <decant/core/batch.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// The four cubic B-splines that reach a place a fraction t of the way from one node to the next. They add up to 1, and
 /// none is negative.
@@ -305,4 +306,4 @@ class KernelGrid {
   std::array<std::vector<float>, channels> sums_;
 };
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -10,9 +10,10 @@
 
 #include <decant/core/image.hpp>
 #include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// Marks squares of eight pixels in which a pixel is liquid in one mask and not in the other.
 class MaskDisagreement {
@@ -65,4 +66,4 @@ class MaskDisagreement {
   Image<std::uint8_t> differs_{};
 };
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -23,12 +23,13 @@
 
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/json.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/recording.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 inline constexpr std::size_t image_limit = 1000000;  // what six digits can name
 inline constexpr std::int64_t object_id_limit = 999999;
@@ -237,4 +238,4 @@ inline void write_model(const std::filesystem::path& path, const TriangleMesh& m
   write_text_file(path, text);
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -10,9 +10,10 @@
 #include <string>
 #include <system_error>
 
+#include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// Where `relative` leads inside `folder`, links resolved; nothing where there is no such entry. Throws
 /// std::runtime_error where it leads out of the folder or nowhere.
@@ -59,4 +60,4 @@ inline std::string six_digits(std::size_t number) {
   return digits.size() < 6 ? std::string(6 - digits.size(), '0') + digits : digits;
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -20,10 +20,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// A value inside a document with its path, as messages name it. Does not own the document.
 class JsonNode {
@@ -211,4 +212,4 @@ inline nlohmann::json parse_json(std::string_view text, const std::string& file,
   }
 }
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

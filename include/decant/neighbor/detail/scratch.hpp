@@ -11,7 +11,9 @@
 #include <type_traits>
 #include <utility>
 
-namespace decant::detail {
+#include <decant/core/target.hpp>
+
+namespace decant::DECANT_TARGET::detail {
 
 /// An array that starts at a cache line and whose contents are lost when it grows.
 template <class Value>
@@ -65,4 +67,4 @@ class Scratch {
   std::size_t capacity_ = 0;
 };
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail

@@ -16,9 +16,10 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::detail {
+namespace decant::DECANT_TARGET::detail {
 
 /// A pixel number as int, within [lowest, highest]; NaN gives the lowest.
 inline int pixel_between(double pixel, int lowest, int highest) noexcept {
@@ -110,4 +111,4 @@ class Splatter {
   std::vector<Footprint> footprints_;
 };
 
-}  // namespace decant::detail
+}  // namespace decant::DECANT_TARGET::detail
