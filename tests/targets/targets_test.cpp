@@ -34,6 +34,8 @@ TEST_CASE("targets: built for AVX2, water stands") {
     require_at_rest(run);
     CHECK(run.lanes == 8);
     CHECK(run.half);
+    // with one name for both, the linker would keep one of them, and calls from elsewhere would find the wrong widths
+    CHECK(run.simulator != run_without_flags().simulator);
     return;
   }
 #endif
@@ -41,11 +43,3 @@ TEST_CASE("targets: built for AVX2, water stands") {
 }
 
 TEST_CASE("targets: built as the other tests are, water stands") { require_at_rest(run_as_built()); }
-
-TEST_CASE("targets: what is compiled for other processors has another name") {
-#if defined(__x86_64__)
-  // with one name for both, the linker would keep one of them, and calls from elsewhere would find the wrong widths
-  CHECK(run_without_flags().simulator.find("4sse2") != std::string::npos);
-#endif
-  CHECK(run_as_built().simulator.find("decant") != std::string::npos);
-}

@@ -14,12 +14,12 @@ namespace decant::DECANT_TARGET {
 
 /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
 /// down) with the stiffness p / (rho d^2), and a sub-step integrates that explicitly, whatever solver finds the
-/// pressure. With Dfsph and ResidualViscosity acting after the pressure in up to two passes, columns of 60 layers stand
-/// still at 0.6 d / sqrt(p / rho), and ones of 80 at 0.4; at 0.5, 80 layers collapse into themselves, and at 0.8, 40.
-/// With one pass they seethe from 0.6 on, without that viscosity they collapse at 0.35. Taken for twice the mean
-/// pressure, which is the largest of a liquid at rest. Liquid that is too dense all the same, after an impact on a deep
-/// pool for one, needs steps in which particles move little against each other: at a third of the usual and below, even
-/// what has collapsed stands up again.
+/// pressure. With Dfsph at its own tolerances and ResidualViscosity acting after the pressure in up to two passes,
+/// columns of 60 layers stand still at 0.6 d / sqrt(p / rho), and ones of 80 at 0.4; at 0.5, 80 layers collapse into
+/// themselves, and at 0.8, 40. With one pass they seethe from 0.6 on, without that viscosity they collapse at 0.35.
+/// Taken for twice the mean pressure, which is the largest of a liquid at rest. Liquid that is too dense all the same,
+/// after an impact on a deep pool for one, needs steps in which particles move little against each other: at a third of
+/// the usual and below, even what has collapsed stands up again.
 /// @param mean_pressure over rest density, of what is under pressure [m^2/s^2]. @param density_tolerance that the
 /// solver keeps to in the mean [-], infinity for solvers that had better not slow down. @param stability_number as
 /// above [-]. @return [s], infinity without pressure.
