@@ -36,7 +36,7 @@ struct SimulatorSettings {
 /// For liquid that a camera keeps correcting, or that is one hypothesis among many: longer sub-steps, each with fewer
 /// iterations. Pours are predicted as well as with the settings that are handed in, in about half the time; single
 /// particles are kept within 1 % of the density in the mean in place of 0.1 %, whole regions as before. For
-/// liquid up to 30 layers deep: deeper, it may collapse into itself, unless tolerance_factor is 3 (40 layers) or 1 (80).
+/// liquid up to 30 layers deep: deeper, it may collapse into itself, unless tolerance_factor is 3 (40 layers), 1 (80).
 inline SimulatorSettings for_tracking(SimulatorSettings settings) {
   settings.courant_number = 1.6;
   settings.stability_number = 0.4;
