@@ -87,7 +87,7 @@
 #include <decant/neighbor/cell_grid.hpp>
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
-#include <decant/pressure/coarse_cells.hpp>
+#include <decant/pressure/coarse_grid.hpp>
 #include <decant/pressure/complementarity_solver.hpp>
 #include <decant/pressure/concept.hpp>
 #include <decant/pressure/dfsph.hpp>

@@ -4,7 +4,10 @@
 /// Thin walls: liquid on two sides of a wall must not feel each other, however close it is.
 
 #include <algorithm>
+#include <atomic>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <decant/boundary/wall_state.hpp>
@@ -18,7 +21,8 @@ namespace decant::DECANT_TARGET {
 /// Takes out of a neighbour list the pairs that a body's wall separates. Few pairs near walls are,
 /// so what walls do to particles (WallState) answers two cheap questions first, a batch of neighbours at a time: a pair
 /// that a wall separates is farther apart than both are from walls, and one of the two is behind the plane that touches
-/// the wall nearest to the other. Only then rays are sent to the surface.
+/// the wall nearest to the other. Only particles that feel a wall are asked, which name the others. Then rays are sent
+/// to the surface.
 template <class ScalarType>
 class WallShield {
  public:
@@ -31,7 +35,10 @@ class WallShield {
       return;
     }
     note_walls(walls, neighbors.size(), threads);
-    neighbors.remove_if([&](Index i) { return any_suspect(neighbors, i); },
+    if (!find_suspects(walls, neighbors, threads)) {
+      return;
+    }
+    neighbors.remove_if([&](Index i) { return suspect_[static_cast<std::size_t>(i)] != 0; },
                         [&](Index i, Index j, const Vector3<Scalar>& from_j_to_i) {
                           if (!may_be_separated(i, j, from_j_to_i)) {
                             return false;
@@ -82,27 +89,54 @@ class WallShield {
             behind_wall<Scalar>(other[0], other[1], other[2], other[3], x, y, z));
   }
 
-  /// may_be_separated of any neighbour. A little more is suspected, so that rounding makes no difference.
+  /// Notes the particles that walls may separate from a neighbour. @return whether there are any.
   template <class Neighbors>
-  bool any_suspect(const Neighbors& neighbors, Index i) const noexcept {
+  bool find_suspects(const WallState<Scalar>& walls, const Neighbors& neighbors, Threads threads) noexcept {
+    suspect_.assign(static_cast<std::size_t>(neighbors.size()), 0);
+    std::atomic<bool> any{false};
+    parallel_for(neighbors.size(), threads, [&](Index i) {
+      if (walls.contact_count[i] > 0 && note_suspects(neighbors, i)) {
+        any.store(true, std::memory_order_relaxed);
+      }
+    });
+    return any;
+  }
+
+  /// The neighbours j of which the particle's nearest wall may separate it, and itself if there are any. A little more
+  /// is suspected than may_be_separated does, so that rounding makes no difference.
+  template <class Neighbors>
+  bool note_suspects(const Neighbors& neighbors, Index i) noexcept {
     using B = Batch<Scalar>;
     const Scalar* const own = &wall_[4 * static_cast<std::size_t>(i)];
     const B own_x(own[0]), own_y(own[1]), own_z(own[2]), own_distance(own[3]);
-    const B nearly(Scalar(0.99));
+    const B nearly(Scalar(0.99)), zero(Scalar(0));
     bool found = false;
     neighbors.for_each_batch(i, [&](const auto& pair) {
-      const auto other = gather4(wall_.data(), pair.neighbor);
-      const B between = nearly * sure_of_distance * (own_distance + other.w);
-      const B zero(Scalar(0));
       const auto behind =
-          behind_wall<B>(own_x, own_y, own_z, nearly * own_distance, zero - pair.x, zero - pair.y, zero - pair.z) |
-          behind_wall<B>(other.x, other.y, other.z, nearly * other.w, pair.x, pair.y, pair.z);
-      found = found || any(pair.valid & behind & (pair.distance_squared > between * between));
+          behind_wall<B>(own_x, own_y, own_z, nearly * own_distance, zero - pair.x, zero - pair.y, zero - pair.z);
+      std::uint32_t lanes = (pair.valid & behind).bits();
+      if (lanes == 0) {
+        return;
+      }
+      const B distance = gather4(wall_.data(), pair.neighbor).w;
+      const B between = nearly * sure_of_distance * (own_distance + distance);
+      for (lanes &= (pair.distance_squared > between * between).bits(); lanes != 0; lanes &= lanes - 1) {
+        note(static_cast<Index>(pair.neighbor[std::countr_zero(lanes)]));
+        found = true;
+      }
     });
+    if (found) {
+      note(i);
+    }
     return found;
   }
 
-  std::vector<Scalar> wall_{};  ///< records of four: gradient of the share, distance
+  void note(Index i) noexcept {  // threads may meet here
+    std::atomic_ref(suspect_[static_cast<std::size_t>(i)]).store(1, std::memory_order_relaxed);
+  }
+
+  std::vector<Scalar> wall_{};           ///< records of four: gradient of the share, distance
+  std::vector<std::uint8_t> suspect_{};  ///< of being separated from a neighbour
 };
 
 }  // namespace decant::DECANT_TARGET

@@ -30,6 +30,11 @@ struct SurfacePoint {
 struct SolidBox {
   Vector3<double> min, max;  ///< [m]
 
+  /// Whether the solid is within `reach` [m] of x: what costs next to nothing to know, for most points are far away.
+  bool is_near(const Vector3<double>& x, double reach) const noexcept {
+    return (x - x.cwiseMax(min).cwiseMin(max)).squaredNorm() < reach * reach;
+  }
+
   SurfacePoint closest(const Vector3<double>& x) const noexcept {
     SurfacePoint result;
     result.point = x.cwiseMax(min).cwiseMin(max);
@@ -59,6 +64,13 @@ struct SolidBox {
 struct SolidRing {
   double inner_radius, outer_radius;  ///< [m]
   double bottom, top;                 ///< [m]
+
+  /// As SolidBox::is_near; also true of some points a little farther away, past an edge.
+  bool is_near(const Vector3<double>& x, double reach) const noexcept {
+    const double squared = x[0] * x[0] + x[1] * x[1];
+    const double outer = outer_radius + reach, inner = std::max(inner_radius - reach, 0.0);
+    return x[2] > bottom - reach && x[2] < top + reach && squared < outer * outer && squared >= inner * inner;
+  }
 
   SurfacePoint closest(const Vector3<double>& x) const noexcept {
     // the cross-section is a rectangle in (radius, height)
@@ -93,6 +105,11 @@ struct SolidRing {
 struct SolidSphere {
   Vector3<double> center;
   double radius;  ///< [m]
+
+  /// As SolidBox::is_near.
+  bool is_near(const Vector3<double>& x, double reach) const noexcept {
+    return (x - center).squaredNorm() < (radius + reach) * (radius + reach);
+  }
 
   SurfacePoint closest(const Vector3<double>& x) const noexcept {
     const Vector3<double> away = x - center;
@@ -132,6 +149,9 @@ class SolidParts {
     std::array<SurfacePoint, max_parts> near;
     std::size_t count = 0;
     for (const SolidPart& part : parts_) {
+      if (!std::visit([&](const auto& solid) { return solid.is_near(x, reach()); }, part)) {
+        continue;
+      }
       const SurfacePoint candidate = std::visit([&x](const auto& solid) { return solid.closest(x); }, part);
       if (candidate.distance < reach()) {
         std::size_t place = count++;
@@ -154,8 +174,9 @@ class SolidParts {
         const double ahead = (near[k].point - near[nearer].point).dot(near[nearer].normal);
         weight *= std::clamp(ahead / blend_, 0.0, 1.0);
       }
-      result.share += weight * plane_.share(near[k].distance);
-      const double slope = weight * plane_.slope(near[k].distance);
+      const WallFunction::ShareAndSlope plane = plane_.share_and_slope(near[k].distance);
+      result.share += weight * plane.share;
+      const double slope = weight * plane.slope;
       result.gradient -= slope * near[k].normal;
       result.moment += slope * std::max(near[k].distance, 0.0) * near[k].normal * near[k].normal.transpose();
     }

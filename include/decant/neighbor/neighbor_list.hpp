@@ -68,6 +68,7 @@ class NeighborList {
   }
 
   Index size() const noexcept { return static_cast<Index>(count_); }
+  const Domain& domain() const noexcept { return domain_; }
 
   /// All rows, with gaps: the neighbours of i are index()[first(i)] to index()[first(i) + count(i) - 1], and up to
   /// padded_end(i) there follows i. first(i) is a multiple of 16, whatever the batch's width.

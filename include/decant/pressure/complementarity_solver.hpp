@@ -11,7 +11,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
-#include <decant/pressure/coarse_cells.hpp>
+#include <decant/pressure/coarse_grid.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
 namespace decant::DECANT_TARGET {
@@ -27,8 +27,9 @@ struct ComplementarityReport {
 ///   r = offset + dt^2 D(a(P)) <= 0,   and r = 0 wherever P > 0
 /// a linear complementarity problem with a symmetric positive semi-definite matrix. Conjugate gradients over the
 /// particles that are in contact (P > 0 or r > 0), preconditioned by the diagonal plus, where whole regions are amiss,
-/// CoarseCells. Where pressures have become negative or particles have come into contact, these are set to zero and
-/// those taken in every few steps, and the directions start over.
+/// CoarseGrid. Where pressures have become negative or particles have come into contact, these are set to zero and
+/// those taken in, and the directions start over, every few steps and whenever more is amiss outside the contacts than
+/// within them: steps only mend what is within (the proportioning of Dostal 1997, SIAM J. Optim. 7).
 template <class ScalarType>
 class ComplementaritySolver {
  public:
@@ -36,22 +37,20 @@ class ComplementaritySolver {
 
   double mean_tolerance = 1e-3;     ///< mean of what may be left amiss, over rest density [-], > 0
   double largest_tolerance = 3e-3;  ///< for any one particle [-], > 0
-  /// Mean of what cells of particles may be amiss by as a whole, over rest density, > 0. What is left in a region adds
-  /// up over its depth and from one sub-step to the next: eighty layers that each give way by 1e-4 fall through
-  /// themselves, while particles that are amiss by ten times as much, some too dense and some too loose, do not.
+  /// Mean of what regions (cells of CoarseGrid) may be amiss by as a whole, over rest density, > 0. What is left in a
+  /// region adds up over its depth and from one sub-step to the next: eighty layers that each give way by 1e-4 fall
+  /// through themselves, while particles that are amiss by ten times as much, some too dense and some too loose, do
+  /// not.
   double net_tolerance = 3e-4;
-  /// How long the matrix of CoarseCells serves, >= 1: it costs as much as three iterations, and the older it is the
-  /// more steps it takes.
-  int sub_steps_per_matrix = 1;
   int most_iterations = 100;  ///< >= 1
 
   /// Forgets all that earlier frames have left: what a frame comes to depends on its state alone.
-  void begin_frame() noexcept { cells_.forget(); }
+  void begin_frame() noexcept { impatient_steps_ = 0; }
 
   /// Forgets the places of particles; call once per sub-step, before the first solve.
   void begin_step() noexcept {
     sorted_ = false;
-    ++age_;
+    impatient_steps_ = std::max(impatient_steps_ - 1, 0);
   }
 
   /// @param offset N, [kg/m^3]. @param term N, P: start and result. Leaves the matching accelerations in the system.
@@ -61,7 +60,7 @@ class ComplementaritySolver {
                               std::vector<Scalar>& term) noexcept {
     const Index count = step.fluid.size();
     const auto n = static_cast<std::size_t>(count);
-    for (auto* values : {&residual_, &direction_, &image_, &contact_}) {
+    for (auto* values : {&residual_, &direction_, &image_, &contact_, &smooth_}) {
       values->resize(n);
     }
     sum_.resize(4 * n);
@@ -74,7 +73,7 @@ class ComplementaritySolver {
       return report;
     }
     if (!sorted_) {
-      cells_.sort(step);
+      grid_.sort(step);
       sorted_ = true;
     }
     const double rest_density = static_cast<double>(step.rest_density);
@@ -83,14 +82,24 @@ class ComplementaritySolver {
     const double net_allowed = net_tolerance * rest_density * static_cast<double>(count);
     const Scalar steep = step.time_step * step.rest_density / step.spacing;
     smallest_slope_ = Scalar(1e-6) * steep * steep;
-    bool particles_done = false;
-    int steps_by_cells = 0;
+    bool particles_done = false, by_grid = false;
+    int steps_by_grid = 0;
     const auto judge = [&](const Progress& progress) {
       report.error = progress.amiss / (rest_density * static_cast<double>(count));
-      net_ = cells_.restrict(residual_, contact_, step.threads);
+      net_ = grid_.restrict(residual_, contact_, step.threads);
       particles_done = progress.amiss <= allowed && progress.largest <= largest_allowed;
       report.converged = particles_done && net_ <= net_allowed;
       return report.converged;
+    };
+    const int patience = impatient_steps_ > 0 ? 0 : most_patience;
+    // @return whether cells take part from here on.
+    const auto call_grid = [&] {
+      if (by_grid || net_ <= net_allowed || report.iterations <= patience) {
+        return false;
+      }
+      impatient_steps_ = patience > 0 ? lasting_impatience : impatient_steps_;
+      grid_.assemble(step, system, contact_);
+      return by_grid = true;
     };
     while (true) {
       const Progress start = set_out(step, system, offset, term, squared_step);
@@ -98,12 +107,8 @@ class ComplementaritySolver {
       if (judge(start) || report.iterations >= most_iterations) {
         return report;
       }
-      const bool in_bulk = net_ > net_allowed;
-      if (in_bulk && (age_ >= sub_steps_per_matrix || !cells_.assembled())) {
-        cells_.assemble(step, system, contact_);
-        age_ = 0;
-      }
-      Scope scope = in_bulk ? Scope::Both : Scope::Particles;
+      call_grid();
+      Scope scope = by_grid ? Scope::Both : Scope::Particles;
       double product = precondition(step, system, squared_step, scope);
       direction_.swap(image_);
       for (int since_start = 1;; ++since_start) {
@@ -125,19 +130,21 @@ class ComplementaritySolver {
         if (enough) {
           return report;
         }
-        if ((now.negative || now.touched) && since_start >= steps_between_starts) {
+        const bool lopsided =
+            since_start >= least_steps_between_starts && now.outside > largest_outside * (now.amiss - now.outside);
+        if ((now.negative || now.touched) && (lopsided || since_start >= most_steps_between_starts)) {
           break;
         }
         // When only whole regions are still amiss, a step by cells alone settles them; particles have no say in it, and
         // what they ask for would take it seven more. Where it does not, the matrix is not that of these cells.
-        const bool was_whole = scope == Scope::Cells;
-        if (in_bulk) {
-          const bool whole = particles_done && !was_whole && steps_by_cells < most_steps_by_cells;
-          scope = whole ? Scope::Cells : Scope::Both;
-          steps_by_cells += whole ? 1 : 0;
+        const bool was_whole = scope == Scope::Grid, fresh = call_grid();
+        if (by_grid) {
+          const bool whole = particles_done && !was_whole && steps_by_grid < most_steps_by_grid;
+          scope = whole ? Scope::Grid : Scope::Both;
+          steps_by_grid += whole ? 1 : 0;
         }
         const double next_product = precondition(step, system, squared_step, scope);
-        const bool goes_on = !was_whole && scope != Scope::Cells;
+        const bool goes_on = !fresh && !was_whole && scope != Scope::Grid;
         const Scalar keep = goes_on ? static_cast<Scalar>(next_product / product) : Scalar(0);
         product = next_product;
         parallel_for(count, step.threads, [&](Index i) {
@@ -149,20 +156,25 @@ class ComplementaritySolver {
   }
 
  private:
-  static constexpr int steps_between_starts = 6;
-  static constexpr int most_steps_by_cells = 8;  ///< per solve
+  static constexpr int least_steps_between_starts = 2, most_steps_between_starts = 6;
+  static constexpr double largest_outside = 0.5;  ///< of what is amiss within the contacts
+  static constexpr int most_steps_by_grid = 8;    ///< per solve
+  static constexpr int most_patience = 6;         ///< evaluations before cells are called
+  static constexpr int lasting_impatience = 8;  ///< sub-steps in which they are called at once, after they were needed
 
   /// Whose residuals a direction answers to.
-  enum class Scope { Particles, Cells, Both };
+  enum class Scope { Particles, Grid, Both };
 
   struct Progress {
     double amiss = 0;       ///< sum over particles [kg/m^3]
+    double outside = 0;     ///< of this, by pressures that are negative and where there has been no contact
     double largest = 0;     ///< of them
     bool negative = false;  ///< some pressure is
     bool touched = false;   ///< some particle has come into contact
 
     static Progress both(const Progress& a, const Progress& b) noexcept {
-      return {a.amiss + b.amiss, std::max(a.largest, b.largest), a.negative || b.negative, a.touched || b.touched};
+      return {a.amiss + b.amiss, a.outside + b.outside, std::max(a.largest, b.largest), a.negative || b.negative,
+              a.touched || b.touched};
     }
     void add(Scalar amiss_here) noexcept {
       amiss += static_cast<double>(amiss_here);
@@ -190,13 +202,13 @@ class ComplementaritySolver {
   double precondition(const Step& step, const PressureSystem<Scalar>& system, Scalar squared_step,
                       Scope scope) noexcept {
     if (scope != Scope::Particles) {
-      cells_.solve(step.time_step);
+      grid_.solve(step.time_step, step.threads, smooth_);
     }
     return sum_over(step, [&](std::size_t own) {
       const Scalar slope = squared_step * system.diagonal()[own];
       // what is not in contact may have no slope to divide by
-      const Scalar alone = scope != Scope::Cells && contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
-      image_[own] = contact_[own] * (scope != Scope::Particles ? alone + cells_.correction(own) : alone);
+      const Scalar alone = scope != Scope::Grid && contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
+      image_[own] = contact_[own] * (scope != Scope::Particles ? alone + smooth_[own] : alone);
       return static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
     });
   }
@@ -272,9 +284,11 @@ class ComplementaritySolver {
             // a negative pressure will be clipped: its own push will be missing
             partial.add(term[own] < 0 ? std::max(left, Scalar(0)) - term[own] * slope
                                       : std::max(left, std::min(-left, term[own] * slope)));
-            partial.negative = partial.negative || term[own] < 0;
             // particles out of contact stay out until the next start
-            partial.touched = partial.touched || (contact_[own] == 0 && left > 0 && slope > smallest_slope_);
+            const bool touched = contact_[own] == 0 && left > 0 && slope > smallest_slope_;
+            partial.outside += static_cast<double>(term[own] < 0 ? -term[own] * slope : touched ? left : Scalar(0));
+            partial.negative = partial.negative || term[own] < 0;
+            partial.touched = partial.touched || touched;
           }
           return partial;
         },
@@ -282,12 +296,13 @@ class ComplementaritySolver {
   }
 
   Scalar smallest_slope_ = 0;
-  CoarseCells<Scalar> cells_{};
-  bool sorted_ = false;
-  int age_ = 0;     ///< of the cells' matrix, in sub-steps
-  double net_ = 0;  ///< what cells are amiss by as a whole, summed over them [kg/m^3]
+  CoarseGrid<Scalar> grid_{};
+  bool sorted_ = false;      ///< the grid, in this sub-step
+  int impatient_steps_ = 0;  ///< sub-steps in which the grid is called at once
+  double net_ = 0;           ///< what cells are amiss by as a whole, summed over them [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0
+  std::vector<Scalar> smooth_{};   ///< the grid's part of what residual_ asks for
   std::vector<Scalar> sum_{};      ///< accelerations by `term`, records as the system's
   Reduction<Progress> reduction_{};
   Reduction<double> reduction_of_sums_{};

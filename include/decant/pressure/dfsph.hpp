@@ -41,8 +41,7 @@ class Dfsph {
   static constexpr bool uses_gradient_correction = true;
 
   Scalar density_tolerance = Scalar(1e-3);     ///< mean compression of the next positions over rest density [-], > 0
-  Scalar divergence_tolerance = Scalar(1e-4);  ///< mean compression per sub-step of the velocities [-], > 0; ten times
-                                               ///< looser, still water keeps falling through itself by what is allowed
+  Scalar divergence_tolerance = Scalar(1e-4);  ///< mean compression per sub-step of the velocities [-], > 0
   Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
   int most_iterations = 200;                   ///< of each solve, per sub-step
   Scalar tolerance_factor = Scalar(1);         ///< of what single particles may be amiss by [-], > 0
@@ -107,7 +106,7 @@ class Dfsph {
           slack(step.fluid.density[i], step.rest_density, dt);
     });
     const ComplementarityReport velocities =
-        relax(step, velocity_system_, memory_.pressure_term, divergence_tolerance, largest_tolerance);
+        relax(step, velocity_system_, memory_.pressure_term, divergence_tolerance, net_divergence_tolerance);
     report.divergence_iterations += velocities.iterations;
     report.divergence_error = std::max(report.divergence_error, velocities.error);
     accelerate(step, velocity_system_);
@@ -126,7 +125,7 @@ class Dfsph {
     if (compute_density_changes(step)) {
       std::fill(impulse_.begin(), impulse_.end(), Scalar(0));
       report.divergence_iterations +=
-          relax(step, place_system_, impulse_, density_tolerance, collision_tolerance).iterations;
+          relax(step, place_system_, impulse_, density_tolerance, net_density_tolerance).iterations;
       accelerate(step, place_system_);
       compute_density_changes(step);
     }
@@ -139,7 +138,7 @@ class Dfsph {
       memory_.shift_term[own] /= dt;
     });
     const ComplementarityReport places =
-        relax(step, place_system_, memory_.shift_term, density_tolerance, largest_tolerance);
+        relax(step, place_system_, memory_.shift_term, density_tolerance, net_density_tolerance);
     report.density_iterations += places.iterations;
     report.density_error = std::max(report.density_error, places.error);
     const Scalar farthest = largest_shift * step.spacing;
@@ -161,9 +160,11 @@ class Dfsph {
   static constexpr Scalar largest_shift = Scalar(0.2);                           ///< spacings, per sub-step
   /// Where particles meet in disorder at high speed, D sees little of it, and places alone would have to be moved so
   /// far that pairs end up at one point. Compression per sub-step, over rest density; calm motion stays below it.
-  static constexpr Scalar collision_threshold = Scalar(0.02), collision_tolerance = Scalar(0.01);
+  static constexpr Scalar collision_threshold = Scalar(0.02);
   static constexpr Scalar closing_time = Scalar(0.05);  ///< [s]
-  static constexpr Scalar net_share = Scalar(0.3);      ///< of the mean tolerances, for cells of particles
+  /// Mean compression of cells of particles as a whole: still water must not fall through itself by what single ones
+  /// are allowed.
+  static constexpr Scalar net_divergence_tolerance = Scalar(3e-5), net_density_tolerance = Scalar(3e-4);
 
   void resize(Index count) {
     const auto n = static_cast<std::size_t>(count);
@@ -230,13 +231,11 @@ class Dfsph {
 
   template <class Step>
   ComplementarityReport relax(const Step& step, PressureSystem<Scalar>& system, std::vector<Scalar>& term,
-                              Scalar tolerance, Scalar largest) noexcept {
+                              Scalar tolerance, Scalar net_tolerance) noexcept {
     complementarity_.mean_tolerance = static_cast<double>(tolerance_factor * tolerance);
-    complementarity_.largest_tolerance = static_cast<double>(tolerance_factor * largest);
+    complementarity_.largest_tolerance = static_cast<double>(tolerance_factor * largest_tolerance);
     // whole regions must not give way the more for it: that adds up over the depth
-    complementarity_.net_tolerance = static_cast<double>(net_share * std::min(tolerance_factor, Scalar(1)) * tolerance);
-    // with tight tolerances, liquid at rest simmers by what an old matrix leaves
-    complementarity_.sub_steps_per_matrix = tolerance_factor > 1 ? 4 : 1;
+    complementarity_.net_tolerance = static_cast<double>(std::min(tolerance_factor, Scalar(1)) * net_tolerance);
     complementarity_.most_iterations = most_iterations;
     return complementarity_.solve(step, system, offset_, term);
   }

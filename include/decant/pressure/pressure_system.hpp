@@ -131,17 +131,16 @@ class PressureSystem {
     });
   }
 
-  /// Minus the accelerations of particle i by a unit of P_j: calls f(neighbor, x, y, z) for each batch of neighbours j,
-  /// whose numbers are at `neighbor`. Rows are filled up with i itself and zeros.
+  /// Minus the accelerations of particle i by a unit of P_j: calls f(pair, x, y, z) for each batch of neighbours j, see
+  /// NeighborList::Pairs. Zero in lanes that are not valid.
   template <class Neighbors, class Function>
   [[gnu::always_inline]] void for_each_response(const Neighbors& list, Index i, Function&& f) const noexcept {
     const CompactScalar* const push = corrected_ ? push_.data() : rate_.data();
-    for (std::size_t at = list.first(i); at < list.padded_end(i); at += width) {
-      const std::uint32_t* const neighbor = list.index() + at;
-      const B weight = weights(neighbor);
-      const Batch3<Scalar> gradient = load(push + 3 * at);
-      f(neighbor, weight * gradient.x, weight * gradient.y, weight * gradient.z);
-    }
+    list.for_each_batch(i, [&](const auto& pair) {
+      const B weight = weights(pair.neighbor);
+      const Batch3<Scalar> gradient = load(push + 3 * pair.slot);
+      f(pair, weight * gradient.x, weight * gradient.y, weight * gradient.z);
+    });
   }
   /// The same by a unit of its own P.
   const Scalar* own_response(Index i) const noexcept { return &total_[4 * static_cast<std::size_t>(i)]; }
