@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <string>
 #include <vector>
@@ -39,18 +38,16 @@ using Liquid = decant::testing::LooseLiquid<decant::CubicSpline<Scalar>>;
 
 struct OwnViscosity {
   float kinematic_viscosity = 1e-6f;
-  std::vector<float> v{};  // velocities in records of four
+  Eigen::Matrix4Xf v{};  // velocities in records of four, the last one unused
 
   template <class Step>
   void accumulate(const Step& step, PointArray<float>& acceleration) noexcept {
-    v.resize(4 * static_cast<std::size_t>(step.fluid.size()));
-    for (Index k = 0; k < 3 * step.fluid.size(); ++k)
-      v[std::size_t(k / 3 * 4 + k % 3)] = step.fluid.velocity(k % 3, k / 3);
+    v.resize(4, step.fluid.size());
+    decant::parallel_for(v.cols(), step.threads, [&](Index i) { v.col(i).head<3>() = step.fluid.velocity.col(i); });
     const float R = 2 * step.smoothing_length, scale = 225 * kinematic_viscosity / (3.14159265f * step.rest_density);
-    decant::parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+    decant::parallel_for(v.cols(), step.threads, [&](Index i) {
       B x(0), y(0), z(0);
-      const float* own = &v[4 * static_cast<std::size_t>(i)];
-      step.neighbors.for_each_batch(i, [&](const auto& pair) {
+      step.neighbors.for_each_batch(i, [&, own = v.col(i)](const auto& pair) {
         const auto other = decant::gather3(v.data(), pair.neighbor);
         const B v_dot_x = (own[0] - other.x) * pair.x + (own[1] - other.y) * pair.y + (own[2] - other.z) * pair.z;
         const B hat = maximum(1 - square_root(pair.distance_squared) * (1 / R), B(0));
@@ -102,14 +99,10 @@ struct LeastSweep {
 class Inputs {
  public:
   Inputs(int per_edge, int threads) {
-    // fewer of the large ones: half a million pairs are more than a processor learns, and memory is not endless
-    const std::size_t count = per_edge <= 20 ? input_count : per_edge <= 40 ? 4 : 1;
-    for (std::size_t seed = 0; seed < count; ++seed) {
-      const PointArray<Scalar> position = in_cell_order(resting_liquid<Scalar>(per_edge, 0.005, seed), Scalar(0.01));
+    for (const PointArray<Scalar>& position : sorted_liquids<Scalar>(per_edge, 0.005, inputs_for(per_edge))) {
       auto liquid = std::make_unique<Liquid>();
       liquid->threads = {threads};
       liquid->place<decant::CellGrid<Scalar>>(position);
-      std::srand(static_cast<unsigned>(seed));  // of Eigen's random numbers
       liquid->fluid.velocity = Scalar(0.05) * PointArray<Scalar>::Random(3, position.cols());
       liquid->fluid.velocity.row(0) += 5 * liquid->fluid.position.row(1);  // shear
       liquid->fluid.pressure.setConstant(1000);
@@ -154,12 +147,15 @@ void measure(Report& report, int per_edge, int threads) {
   add("Viscosity", decant::Viscosity<Scalar>{});
   add("ResidualViscosity", decant::ResidualViscosity<Scalar>{});
   add("SurfaceTension", decant::SurfaceTension<Scalar>{});
-  add("ViscosityWeiler2018, of honey", decant::ViscosityWeiler2018<Scalar>{.kinematic_viscosity = Scalar(7e-3)});
+  decant::ViscosityWeiler2018<Scalar> of_honey;
+  of_honey.kinematic_viscosity = Scalar(7e-3);
+  add("ViscosityWeiler2018, of honey", of_honey);
   add("ViscositySchenck2017", decant::ViscositySchenck2017<Scalar>{});
   add("SurfaceTensionSchenck2017", decant::SurfaceTensionSchenck2017<Scalar>{});
   shipped.run();
 
-  const decant::Viscosity<Scalar> viscosity{.kinematic_viscosity = Scalar(1e-6)};
+  decant::Viscosity<Scalar> viscosity;
+  viscosity.kinematic_viscosity = OwnViscosity{}.kinematic_viscosity;
   const PointArray<Scalar> expected = inputs.acceleration_by(viscosity);
   for (const auto& own : {inputs.acceleration_by(OwnViscosity{}), inputs.acceleration_by(OwnViscosityByPairs{})}) {
     decant::expects((own - expected).norm() < 1e-4f * expected.norm(), "bench_forces: error of a user's copy",

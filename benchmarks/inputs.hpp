@@ -58,15 +58,20 @@ decant::PointArray<Scalar> in_cell_order(const decant::PointArray<Scalar>& shuff
   return sorted;
 }
 
-/// input_count liquids that differ by their jitter, each in cell order.
+/// Liquids that differ by their jitter, each in cell order.
 template <class Scalar>
-std::vector<decant::PointArray<Scalar>> sorted_liquids(Index per_edge, double spacing) {
+std::vector<decant::PointArray<Scalar>> sorted_liquids(Index per_edge, double spacing,
+                                                       std::size_t count = input_count) {
   std::vector<decant::PointArray<Scalar>> liquids;
-  for (std::size_t seed = 0; seed < input_count; ++seed) {
+  for (std::size_t seed = 0; seed < count; ++seed) {
     liquids.push_back(in_cell_order(resting_liquid<Scalar>(per_edge, spacing, seed), static_cast<Scalar>(2 * spacing)));
   }
   return liquids;
 }
+
+/// How many inputs are enough where each takes much memory (10 MB for the lists of 8,000 particles): no processor
+/// learns the branches of a hundred thousand rows, so that large inputs need no company.
+inline std::size_t inputs_for(int per_edge) { return per_edge <= 20 ? input_count : per_edge <= 40 ? 4 : 2; }
 
 /// A cup with 3 mm walls, 0.09 m high, whose outline has `steps` pieces and is turned in as many: 2 steps^2 triangles.
 inline decant::TriangleMesh cup(std::uint32_t steps) {

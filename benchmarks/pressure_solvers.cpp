@@ -1,17 +1,15 @@
 // SPDX-License-Identifier: MIT
-/// Times pressure solvers by themselves, through what the concept PressureSolver asks for: setting up, one iteration, a
-/// whole solve. A cube of liquid in general position and without walls, spacing 5 mm, support 10 mm, that contracts by
-/// 0.15 % per sub-step of 1 ms. In the same run, over the same pairs: one sweep that reads a number of each neighbour.
-/// The note says how many such sweeps a time is. Usage: bench_micro_pressure_solver [threads, default 1 and 2]
-/// [particles per edge, default 20 and 40; 80 takes minutes]
+/// Pressure solvers by themselves, through what the concept PressureSolver asks for: setting up, one iteration, a whole
+/// solve. A cube of liquid in general position and without walls, spacing 5 mm, support 10 mm, that contracts by 0.15 %
+/// per sub-step of 1 ms. The reference is one sweep over the same pairs that reads a number of each neighbour, so that
+/// ratios say how many such sweeps a part is worth; an iteration is also set beside step_limit's, where it is there.
 
+#include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <cstdlib>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include <decant/kernel/cubic_spline.hpp>
@@ -19,155 +17,182 @@
 #include <decant/pressure/dfsph.hpp>
 #include <decant/pressure/position_based.hpp>
 #include <decant/pressure/state_equation.hpp>
+#include <decant/pressure/state_equation_schenck2017.hpp>
 #include <decant/testing/force.hpp>
 
 #include "common.hpp"
+#include "inputs.hpp"
+#include "step_limit.hpp"
 
 namespace {
 
 using namespace decant_benchmark;
 using decant::PointArray;
 using decant::PressureReport;
-using decant::Threads;
 
 using Scalar = float;
 using Liquid = decant::testing::LooseLiquid<decant::CubicSpline<Scalar>>;
+using Positions = std::vector<PointArray<Scalar>>;
 constexpr double spacing = 0.005;
 
-// In the order in which a simulator keeps its particles.
-PointArray<Scalar> sorted_liquid(Index per_edge) {
-  const PointArray<Scalar> shuffled = resting_liquid<Scalar>(per_edge, spacing);
-  decant::CellGrid<Scalar> grid;
-  grid.rebuild(shuffled, static_cast<Scalar>(2 * spacing), Threads{1});
-  PointArray<Scalar> sorted(3, shuffled.cols());
-  for (Index k = 0; k < shuffled.cols(); ++k) {
-    sorted.col(k) = shuffled.col(grid.order()[static_cast<std::size_t>(k)]);
-  }
-  return sorted;
-}
-
-// One number of each neighbour, added up: the least that any step of an iteration has to do.
-Timing streaming_sweep(const Liquid& liquid) {
-  using B = decant::Batch<Scalar>;
-  const Index count = liquid.fluid.size();
-  std::vector<Scalar> term(static_cast<std::size_t>(count)), result(term.size());
-  for (std::size_t i = 0; i < term.size(); ++i) {
-    term[i] = static_cast<Scalar>(1 + i % 7);
-  }
-  const Timing timing = time_of([&] {
-    decant::parallel_for(count, liquid.threads, [&](Index i) {
-      B total(0);
-      const std::size_t end = liquid.neighbors.padded_end(i);
-      for (std::size_t k = liquid.neighbors.first(i); k < end; k += B::width) {
-        total += decant::gather(term.data(), liquid.neighbors.index() + k);
-      }
-      result[static_cast<std::size_t>(i)] = sum(total);
-    });
-  });
-  keep(result);
-  return timing;
-}
-
-std::string in_sweeps(double seconds, const Timing& sweep) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.2f sweeps", seconds / sweep.median);
-  return text;
-}
-
-int iterations(const PressureReport& report) { return report.density_iterations + report.divergence_iterations; }
-
-std::string iterations_of(const PressureReport& report) {
-  return "; iterations: " + std::to_string(iterations(report));
-}
-
+/// A contracting liquid and a solver at work on it.
 template <class Solver>
-void run(Csv& csv, const std::string& name, const PointArray<Scalar>& position, Threads threads) {
-  Liquid liquid;
-  liquid.threads = threads;
-  liquid.place<decant::CellGrid<Scalar>>(position);
-  liquid.update<decant::CellGrid<Scalar>>(static_cast<double>(Solver::search_margin));
-  const Index count = liquid.fluid.size();
-  const double neighbors = static_cast<double>(liquid.neighbors.pairs()) / static_cast<double>(count);
-  const auto step = liquid.view();
-  const Scalar contraction = Scalar(0.0015) / (3 * liquid.time_step);  // [1/s]
-  PointArray<Scalar> start = -contraction * position;
+class Problem {
+ public:
+  Problem(const Positions& positions, int threads) : positions_(positions) {
+    liquid_.threads = {threads};
+    take(0);
+  }
 
-  const Timing sweep = streaming_sweep(liquid);
-  csv.row(name + ": reference sweep", threads.count, count, neighbors, sweep);
-  const auto row = [&](const std::string& what, const Timing& timing, const std::string& note = "") {
-    csv.row(name + ": " + what, threads.count, count, neighbors, timing, in_sweeps(timing.median, sweep) + note);
-  };
-  // every call solves the same problem; to put the velocities back costs a thousandth of it
-  const auto solve = [&](Solver& solver, bool warm) {
+  /// Lists are written anew, so that they are in the caches as in a simulation, where they are just as fresh.
+  void take(std::size_t input) {
+    const PointArray<Scalar>& position = positions_[input % positions_.size()];
+    liquid_.template place<decant::CellGrid<Scalar>>(position);
+    liquid_.template update<decant::CellGrid<Scalar>>(static_cast<double>(Solver::search_margin));
+    start_ = -Scalar(0.0015) / (3 * liquid_.time_step) * position;
+    liquid_.fluid.velocity = start_;
+    term_.assign(static_cast<std::size_t>(position.cols()), Scalar(1));
+    result_ = term_;
+  }
+
+  void sweep() {
+    using B = decant::Batch<Scalar>;
+    decant::parallel_for(liquid_.fluid.size(), liquid_.threads, [&](Index i) {
+      B total(0);
+      const std::size_t end = liquid_.neighbors.padded_end(i);
+      for (std::size_t k = liquid_.neighbors.first(i); k < end; k += B::width) {
+        total += decant::gather(term_.data(), liquid_.neighbors.index() + k);
+      }
+      result_[static_cast<std::size_t>(i)] = sum(total);
+    });
+    keep(result_);
+  }
+
+  void begin(Solver& solver) {
     PressureReport report;
-    liquid.fluid.velocity = start;
-    liquid.shift.setZero();
-    if (!warm) {
+    solver.begin_step(liquid_.view(), report);
+  }
+
+  /// The same every time; to put the velocities back costs a thousandth of it.
+  PressureReport solve(Solver& solver, bool from_nothing) {
+    PressureReport report;
+    liquid_.fluid.velocity = start_;
+    liquid_.shift.setZero();
+    if (from_nothing) {
       solver.memory().clear();
     }
+    const auto step = liquid_.view();
     solver.begin_step(step, report);
     solver.solve(step, report);
     return report;
+  }
+
+  const Liquid& liquid() const { return liquid_; }
+
+ private:
+  const Positions& positions_;
+  Liquid liquid_{};
+  PointArray<Scalar> start_{};
+  std::vector<Scalar> term_{}, result_{};
+};
+
+int iterations(const PressureReport& report) { return report.density_iterations + report.divergence_iterations; }
+
+/// One that takes that many iterations, whatever the error.
+template <class Solver>
+Solver limited_to(int most_iterations) {
+  Solver solver;
+  solver.most_iterations = most_iterations;
+  if constexpr (requires { solver.density_tolerance; }) {
+    solver.density_tolerance = 0;
+  }
+  if constexpr (requires { solver.divergence_tolerance; }) {
+    solver.divergence_tolerance = 0;
+  }
+  return solver;
+}
+
+template <class Solver>
+void measure(Report& report, const std::string& name, const Positions& positions, int threads) {
+  if (!report.wants(name)) {
+    return;
+  }
+  Problem<Solver> problem(positions, threads);
+  const long size = positions[0].cols();
+  Comparison parts(report, name, size, threads);
+  const auto add = [&](Comparison& to, const std::string& what, auto&& run) -> Comparison::Case& {
+    Comparison::Case& added = to.add(what, [run](std::size_t) mutable { run(); });
+    added.prepare = [&problem](std::size_t turn) { problem.take(turn); };
+    return added;
   };
 
-  Solver solver;
-  {
-    PressureReport report;
-    liquid.fluid.velocity = start;
-    const Timing timing = time_of([&] { solver.begin_step(step, report); });
-    if (timing.median > 1e-7) {  // not all have something to set up
-      row("begin_step", timing);
-    }
+  add(parts, "sweep that reads one number", [&problem] { problem.sweep(); });
+  Solver solver, warm;
+  if (seconds_of([&] { problem.begin(solver); }) > 1e-6) {  // not all have something to set up
+    add(parts, "begin_step", [&problem, &solver] { problem.begin(solver); });
   }
-  PressureReport report = solve(solver, false);
-  if (!liquid.fluid.velocity.allFinite() || !(liquid.fluid.pressure.maxCoeff() > 0)) {
+  const PressureReport done = problem.solve(solver, true);
+  if (!problem.liquid().fluid.velocity.allFinite() || !(problem.liquid().fluid.pressure.maxCoeff() > 0)) {
     throw std::runtime_error(name + " left no pressure, or velocities that are not finite");
   }
-  const Timing forgetful = time_of([&] { report = solve(solver, false); });
-  row("begin_step and solve", forgetful, iterations_of(report));
+  add(parts, "begin_step and solve", [&] { problem.solve(solver, true); }).note =
+      std::to_string(iterations(done)) + " iterations";
   if constexpr (!std::is_empty_v<typename Solver::Memory>) {
-    const Timing from_solution = time_of([&] { report = solve(solver, true); });
-    row("begin_step and solve from the solution", from_solution, iterations_of(report));
+    problem.solve(warm, false);
+    const int again = iterations(problem.solve(warm, false));
+    Comparison::Case& from_solution =
+        add(parts, "begin_step and solve from the solution", [&] { problem.solve(warm, false); });
+    from_solution.prepare = [&](std::size_t turn) {
+      problem.take(turn);
+      warm.memory().clear();
+      problem.solve(warm, false);
+    };
+    from_solution.note = std::to_string(again) + " iterations";
   }
 
-  // The difference between many iterations and few, so that what a solve does once drops out.
   if constexpr (requires { solver.most_iterations; }) {
-    const auto with_iterations = [&](int most) {
-      Solver limited;
-      limited.most_iterations = most;
-      if constexpr (requires { limited.density_tolerance; }) {
-        limited.density_tolerance = 0;
+    // The difference between many iterations and few, so that what a solve does once drops out.
+    Solver few = limited_to<Solver>(5), many = limited_to<Solver>(25);
+    const int difference = iterations(problem.solve(many, true)) - iterations(problem.solve(few, true));
+    if (difference > 0) {
+      const std::string of_many = "solve with 25 iterations", of_few = "solve with 5 iterations";
+      add(parts, of_many, [&] { problem.solve(many, true); });
+      add(parts, of_few, [&] { problem.solve(few, true); });
+      parts.add_difference("one iteration", of_many, of_few, difference);
+      parts.run();
+
+      const std::string beside = name + ", one iteration beside step_limit";
+      const int per_edge = static_cast<int>(std::lround(std::cbrt(static_cast<double>(size))));
+      const std::map<std::string, Spread> limit = step_limit_figures(per_edge, threads);
+      if (report.wants(beside) && limit.contains("DFSPH iter stored f16 AoS")) {
+        Comparison comparison(report, beside, size, threads);
+        comparison.add_from_outside("step_limit: DFSPH iter stored f16 AoS", limit.at("DFSPH iter stored f16 AoS"));
+        add(comparison, of_many, [&] { problem.solve(many, true); });
+        add(comparison, of_few, [&] { problem.solve(few, true); });
+        comparison.add_difference("one iteration", of_many, of_few, difference);
+        comparison.run();
       }
-      if constexpr (requires { limited.divergence_tolerance; }) {
-        limited.divergence_tolerance = 0;
-      }
-      const int taken = iterations(solve(limited, false));
-      return std::pair(taken, time_of([&] { solve(limited, false); }));
-    };
-    const auto [few, short_time] = with_iterations(5);
-    const auto [many, long_time] = with_iterations(25);
-    if (many > few) {
-      Timing each = long_time;
-      each.median = (long_time.median - short_time.median) / (many - few);
-      each.fastest = (long_time.fastest - short_time.fastest) / (many - few);
-      each.spread = (long_time.spread + short_time.spread) / (many - few);
-      row("one iteration", each, "; from " + std::to_string(many) + " and " + std::to_string(few));
+      return;
     }
   }
+  parts.run();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  Csv csv;
-  const std::vector<int> thread_counts = argc > 1 ? std::vector<int>{std::atoi(argv[1])} : std::vector<int>{1, 2};
-  const std::vector<int> edges = argc > 2 ? std::vector<int>{std::atoi(argv[2])} : std::vector<int>{20, 40};
-  for (const int per_edge : edges) {
-    const PointArray<Scalar> position = sorted_liquid(per_edge);
-    for (const int threads : thread_counts) {
-      run<decant::Dfsph<Scalar>>(csv, "Dfsph", position, Threads{threads});
-      run<decant::PositionBased<Scalar>>(csv, "PositionBased", position, Threads{threads});
-      run<decant::StateEquation<Scalar>>(csv, "StateEquation", position, Threads{threads});
+  Options options("bench_pressure_solvers", "pressure solvers: setting up, one iteration, a solve");
+  options.add_threads().add("sizes", "20,40", "particles per edge of a cube of liquid; 80 takes minutes");
+  return benchmark_main(argc, argv, options, [](const Options& given, Report& report) {
+    const std::vector<int> threads = given.numbers("threads");
+    for (const int per_edge : given.numbers("sizes")) {
+      const Positions positions = sorted_liquids<Scalar>(per_edge, spacing, inputs_for(per_edge));
+      for (const int count : threads) {
+        measure<decant::Dfsph<Scalar>>(report, "Dfsph", positions, count);
+        measure<decant::PositionBased<Scalar>>(report, "PositionBased", positions, count);
+        measure<decant::StateEquation<Scalar>>(report, "StateEquation", positions, count);
+        measure<decant::StateEquationSchenck2017<Scalar>>(report, "StateEquationSchenck2017", positions, count);
+      }
     }
-  }
+  });
 }
