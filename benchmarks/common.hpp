@@ -14,7 +14,6 @@
 #include <deque>
 #include <exception>
 #include <functional>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,9 +59,9 @@ class Comparison {
     Call prepare{};    ///< called before each sample, not timed; then all calls of a sample have one input
     double scale = 1;  ///< the time of a call times this is what is reported
     std::string note{};
-    int calls = 1;                         ///< per sample
-    std::vector<double> seconds{};         ///< per call, scaled: one for each round
-    std::optional<Spread> from_outside{};  ///< measured by another program [s]
+    int calls = 1;                                 ///< per sample
+    std::vector<double> seconds{};                 ///< per call, scaled: one for each round
+    std::function<double()> measured_elsewhere{};  ///< a sample by another program, in place of run [s]
   };
 
   Comparison(Report& report, std::string title, long size, int threads, Unit unit = milliseconds)
@@ -71,10 +70,10 @@ class Comparison {
   /// The case returned may be completed until run(). The first one added is the reference.
   Case& add(std::string name, Call run) { return cases_.emplace_back(Case{std::move(name), std::move(run)}); }
 
-  /// A figure that another program has measured, in the same minutes [s].
-  Case& add_from_outside(std::string name, const Spread& seconds) {
+  /// A case that another program measures; called once in each round [s].
+  Case& add_from_elsewhere(std::string name, std::function<double()> sample) {
     Case& added = add(std::move(name), {});
-    added.from_outside = seconds;
+    added.measured_elsewhere = std::move(sample);
     return added;
   }
 
@@ -99,8 +98,11 @@ class Comparison {
     report_.heading(title_, size_, threads_);
     const Case& reference = cases_.front();
     for (const Case& c : cases_) {
-      const Spread seconds = c.from_outside ? *c.from_outside : Spread(c.seconds);
-      report_.add(title_, {c.name, size_, threads_, unit_.per_second * seconds, unit_.name, ratio(c, reference),
+      std::vector<double> ratios;
+      for (std::size_t round = 0; round < c.seconds.size(); ++round) {
+        ratios.push_back(c.seconds[round] / reference.seconds[round]);
+      }
+      report_.add(title_, {c.name, size_, threads_, unit_.per_second * Spread(c.seconds), unit_.name, Spread(ratios),
                            reference.name, c.note});
     }
   }
@@ -118,6 +120,9 @@ class Comparison {
   }
 
   static double sample(Case& c, std::size_t turn, int calls) {
+    if (c.measured_elsewhere) {
+      return c.measured_elsewhere();
+    }
     if (c.prepare) {
       c.prepare(turn);
     }
@@ -133,9 +138,11 @@ class Comparison {
     std::vector<Case*> timed;
     for (Case& c : cases_) {
       if (c.run) {
-        timed.push_back(&c);
         sample(c, 0, 1);  // to warm up: buffers grow, pages are touched
         c.calls = static_cast<int>(std::clamp(2e-3 * c.scale / std::max(sample(c, 1, 1), 1e-9), 0.0, 1e6)) + 1;
+      }
+      if (c.run || c.measured_elsewhere) {
+        timed.push_back(&c);
       }
     }
     const double budget = report_.seconds() * static_cast<double>(timed.size());
@@ -148,21 +155,6 @@ class Comparison {
       });
       std::reverse(timed.begin(), timed.end());  // so that a drift within a round favours nobody
     }
-  }
-
-  /// Round by round where both were measured in rounds.
-  static Spread ratio(const Case& c, const Case& reference) {
-    if (c.seconds.empty() || reference.seconds.empty()) {
-      const auto median = [](const Case& of) {
-        return (of.from_outside ? *of.from_outside : Spread(of.seconds)).median;
-      };
-      return median(c) / median(reference);
-    }
-    std::vector<double> ratios;
-    for (std::size_t round = 0; round < c.seconds.size(); ++round) {
-      ratios.push_back(c.seconds[round] / reference.seconds[round]);
-    }
-    return Spread(std::move(ratios));
   }
 
   Report& report_;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -111,17 +110,14 @@ void measure_lists(Report& report, const Liquids& liquids, int thread_count) {
   }
   lists.run();
 
-  const std::string beside = "neighbour lists, beside step_limit";
-  if (report.wants(beside)) {
+  if (!step_limit_program().empty()) {
     const int per_edge = static_cast<int>(std::lround(std::cbrt(static_cast<double>(size))));
-    const std::map<std::string, Spread> limit = step_limit_figures(per_edge, thread_count);
-    if (limit.contains("SEARCH sort+list v2")) {
-      Comparison comparison(report, beside, size, thread_count);
-      comparison.add_from_outside("step_limit: sort and list", limit.at("SEARCH sort+list v2"));
-      comparison.add("CellGrid: sort and list", sort_and_list);
-      comparison.add("the same, one input only, as step_limit has", [&](std::size_t) { sort_and_list(0); });
-      comparison.run();
-    }
+    Comparison beside(report, "neighbour lists, beside step_limit", size, thread_count);
+    beside.add_from_elsewhere("step_limit: sort and list",
+                              [=] { return step_limit_figure("SEARCH sort+list v2", per_edge, thread_count); });
+    beside.add("CellGrid: sort and list", sort_and_list);
+    beside.add("the same, one input only, as step_limit has", [&](std::size_t) { sort_and_list(0); });
+    beside.run();
   }
 }
 
