@@ -68,7 +68,11 @@ class Comparison {
       : report_(report), title_(std::move(title)), size_(size), threads_(threads), unit_(unit) {}
 
   /// The case returned may be completed until run(). The first one added is the reference.
-  Case& add(std::string name, Call run) { return cases_.emplace_back(Case{std::move(name), std::move(run)}); }
+  Case& add(std::string name, Call run, std::string note = "") {
+    Case& added = cases_.emplace_back(Case{std::move(name), std::move(run)});
+    added.note = std::move(note);
+    return added;
+  }
 
   /// A case that another program measures; called once in each round [s].
   Case& add_from_elsewhere(std::string name, std::function<double()> sample) {

@@ -94,7 +94,7 @@ void measure_lists(Report& report, const Liquids& liquids, int thread_count) {
   lists.add("KdTree (nanoflann, its tree is built on one thread)",
             [&](std::size_t turn) { list.build(tree, liquids.in_order(turn), support, threads); });
 #endif
-  lists.add("CellGrid: sort and list", sort_and_list).note = std::to_string(neighbors).substr(0, 4) + " neighbours";
+  lists.add("CellGrid: sort and list", sort_and_list, std::to_string(neighbors).substr(0, 4) + " neighbours");
   lists.add("CellGrid: list of sorted particles",
             [&](std::size_t turn) { list.build(grid, liquids.in_order(turn), support, threads); });
   lists.add("CellGrid: list of shuffled particles",

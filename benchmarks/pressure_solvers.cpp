@@ -103,6 +103,8 @@ class Problem {
 
 int iterations(const PressureReport& report) { return report.density_iterations + report.divergence_iterations; }
 
+std::string in_words(const PressureReport& report) { return std::to_string(iterations(report)) + " iterations"; }
+
 /// One that takes that many iterations, whatever the error.
 template <class Solver>
 Solver limited_to(int most_iterations) {
@@ -125,8 +127,10 @@ void measure(Report& report, const std::string& name, const Positions& positions
   Problem<Solver> problem(positions, threads);
   const long size = positions[0].cols();
   Comparison parts(report, name, size, threads);
-  const auto add = [&](Comparison& to, const std::string& what, auto&& run) -> Comparison::Case& {
-    Comparison::Case& added = to.add(what, [run](std::size_t) mutable { run(); });
+  const auto add = [&](Comparison& to, const std::string& what, auto&& run,
+                       std::string note = "") -> Comparison::Case& {
+    Comparison::Case& added = to.add(
+        what, [run](std::size_t) mutable { run(); }, std::move(note));
     added.prepare = [&problem](std::size_t turn) { problem.take(turn); };
     return added;
   };
@@ -140,24 +144,23 @@ void measure(Report& report, const std::string& name, const Positions& positions
   if (!problem.liquid().fluid.velocity.allFinite() || !(problem.liquid().fluid.pressure.maxCoeff() > 0)) {
     throw std::runtime_error(name + " left no pressure, or velocities that are not finite");
   }
-  add(parts, "begin_step and solve", [&] { problem.solve(solver, true); }).note =
-      std::to_string(iterations(done)) + " iterations";
+  add(
+      parts, "begin_step and solve", [&] { problem.solve(solver, true); }, in_words(done));
   if constexpr (requires(PressureReport & r) { solver.correct_places(problem.liquid().view(), r); }) {
-    const int in_all = iterations(problem.solve(solver, true, true));
-    add(parts, "all of a sub-step", [&] { problem.solve(solver, true, true); }).note =
-        std::to_string(in_all) + " iterations";
+    const PressureReport all = problem.solve(solver, true, true);
+    add(
+        parts, "all of a sub-step", [&] { problem.solve(solver, true, true); }, in_words(all));
   }
   if constexpr (!std::is_empty_v<typename Solver::Memory>) {
     problem.solve(warm, false);
-    const int again = iterations(problem.solve(warm, false));
-    Comparison::Case& from_solution =
-        add(parts, "begin_step and solve from the solution", [&] { problem.solve(warm, false); });
+    const PressureReport again = problem.solve(warm, false);
+    Comparison::Case& from_solution = add(
+        parts, "begin_step and solve from the solution", [&] { problem.solve(warm, false); }, in_words(again));
     from_solution.prepare = [&](std::size_t turn) {
       problem.take(turn);
       warm.memory().clear();
       problem.solve(warm, false);
     };
-    from_solution.note = std::to_string(again) + " iterations";
   }
 
   if constexpr (requires { solver.most_iterations; }) {
