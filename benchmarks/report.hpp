@@ -125,9 +125,9 @@ class Report {
     std::printf("  %s %-44s %10.4g [%.4g .. %.4g] %s", is_reference ? "*" : " ", result.name.c_str(),
                 result.value.median, result.value.low, result.value.high, result.unit.c_str());
     if (result.ratio && !is_reference) {
-      std::printf("  x %.3f", result.ratio->median);
+      std::printf("  x %.3g", result.ratio->median);
       if (result.ratio->low < result.ratio->high) {
-        std::printf(" [%.3f .. %.3f]", result.ratio->low, result.ratio->high);
+        std::printf(" [%.3g .. %.3g]", result.ratio->low, result.ratio->high);
       }
     }
     std::printf("%s%s\n", result.note.empty() ? "" : "  # ", result.note.c_str());
