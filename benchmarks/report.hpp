@@ -122,8 +122,11 @@ class Report {
   /// @param title of the comparison that the result belongs to.
   void add(const std::string& title, const Result& result) {
     const bool is_reference = result.reference == result.name;
-    std::printf("  %s %-44s %10.4g [%.4g .. %.4g] %s", is_reference ? "*" : " ", result.name.c_str(),
-                result.value.median, result.value.low, result.value.high, result.unit.c_str());
+    std::printf("  %s %-44s %10.4g", is_reference ? "*" : " ", result.name.c_str(), result.value.median);
+    if (result.value.low < result.value.high) {
+      std::printf(" [%.4g .. %.4g]", result.value.low, result.value.high);
+    }
+    std::printf(" %s", result.unit.c_str());
     if (result.ratio && !is_reference) {
       std::printf("  x %.3g", result.ratio->median);
       if (result.ratio->low < result.ratio->high) {
