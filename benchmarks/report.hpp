@@ -31,7 +31,10 @@ struct Spread {
     decant::expects(!samples.empty(), "Spread: number of samples", "at least 1", 0);
     std::sort(samples.begin(), samples.end());
     const auto quantile = [&samples](double share) {
-      return samples[static_cast<std::size_t>(share * static_cast<double>(samples.size() - 1) + 0.5)];
+      const double place = share * static_cast<double>(samples.size() - 1);
+      const auto below = static_cast<std::size_t>(place);
+      const double above = samples[std::min(below + 1, samples.size() - 1)];
+      return samples[below] + (place - static_cast<double>(below)) * (above - samples[below]);
     };
     median = quantile(0.5);
     low = quantile(0.1);
