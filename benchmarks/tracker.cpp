@@ -136,7 +136,9 @@ void report_contestant(Report& report, const Contestant& of, const Contestant& r
   add("a sub-step", sum_of(of.part_ms[0]) / sub_steps, "ms");
   add("density iterations per sub-step", of.steps.density_iterations / sub_steps, "");
   add("divergence iterations per sub-step", of.steps.divergence_iterations / sub_steps, "");
-  add("intersection over union", of.compared > 0 ? 100 * of.iou / of.compared : 0, "%", "mean over frames");
+  if (of.compared > 0) {
+    add("intersection over union", 100 * of.iou / of.compared, "%", "mean over frames");
+  }
 }
 
 }  // namespace
