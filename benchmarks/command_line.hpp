@@ -71,7 +71,11 @@ class Options {
   std::vector<std::string> words(std::string_view name) const {
     std::vector<std::string> result{""};
     for (const char letter : text(name)) {
-      letter == ',' ? void(result.emplace_back()) : result.back().push_back(letter);
+      if (letter == ',') {
+        result.emplace_back();
+      } else {
+        result.back().push_back(letter);
+      }
     }
     return result;
   }

@@ -14,6 +14,7 @@
 #include <deque>
 #include <exception>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,11 +40,12 @@ double seconds_of(Function&& f) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+/// What times are reported in.
 struct Unit {
   const char* name;
   double per_second;
 };
-inline constexpr Unit milliseconds{"ms", 1e3}, microseconds{"us", 1e6}, nanoseconds{"ns", 1e9};
+inline constexpr Unit milliseconds{"ms", 1e3};
 
 /// Cases that do the same thing in different ways, or parts of one thing, measured in turns: A B C, C B A, ... A sample
 /// is a batch of calls of at least 2 ms.
@@ -177,6 +179,9 @@ int benchmark_main(int count, char** arguments, Options options, Body&& body) {
     if (options.parse(count, arguments)) {
       Report report(options);
       body(static_cast<const Options&>(options), report);
+      if (report.empty()) {
+        throw std::invalid_argument("nothing to measure: no title contains '" + options.text("only") + "'");
+      }
     }
     return 0;
   } catch (const std::exception& error) {

@@ -3,7 +3,7 @@
 """Compares two commits by a benchmark: builds both, runs them alternately, and says which figures differ.
 
   benchmarks/compare_commits.py BEFORE AFTER PROGRAM [options] [-- arguments of the program]
-  benchmarks/compare_commits.py v0.4.0 HEAD bench_neighbor_search --runs 10 -- --threads 1 --sizes 20
+  benchmarks/compare_commits.py HEAD~1 HEAD bench_neighbor_search --runs 10 -- --threads 1 --sizes 20
 
 Runs go A B, B A, A B, ..., so that a drift of the machine's speed favours neither; each pair gives one ratio per
 figure. Printed are the medians, the median ratio AFTER / BEFORE, and an interval that holds the true median ratio with

@@ -104,8 +104,6 @@ class Report {
   /// Throws std::runtime_error if the file cannot be written.
   explicit Report(const Options& options)
       : benchmark_(options.program()), only_(options.text("only")), seconds_(options.number("seconds")) {
-    std::printf("%s; %s, %s, %s\n", benchmark_.c_str(), compiler().c_str(), flags().c_str(), processor().c_str());
-    std::printf("median [10th .. 90th percentile], and the median of paired ratios to the case marked *\n");
     if (const std::string& file = options.text("csv"); !file.empty()) {
       csv_.open(file);
       csv_ << "benchmark,case,size,threads,median,low,high,unit,ratio,reference,compiler,flags,cpu,note\n";
@@ -118,7 +116,14 @@ class Report {
   double seconds() const { return seconds_; }  ///< for each case
   bool wants(const std::string& title) const { return title.find(only_) != std::string::npos; }
 
+  bool empty() const { return !started_; }  ///< whether nothing was reported
+
   void heading(const std::string& title, long size, int threads) {
+    if (!started_) {
+      std::printf("%s; %s, %s, %s\n", benchmark_.c_str(), compiler().c_str(), flags().c_str(), processor().c_str());
+      std::printf("median [10th .. 90th percentile], and the median of paired ratios to the case marked *\n");
+      started_ = true;
+    }
     std::printf("\n%s (size %ld, %d thread%s)\n", title.c_str(), size, threads, threads == 1 ? "" : "s");
   }
 
@@ -162,6 +167,7 @@ class Report {
   std::string benchmark_, only_;
   double seconds_;
   std::ofstream csv_{};
+  bool started_ = false;
 };
 
 }  // namespace decant_benchmark

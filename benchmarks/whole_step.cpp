@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -48,10 +49,18 @@ struct Workload {
   double duration_explicit, frame_explicit;  ///< the same for StateEquation [s]
 };
 
-const std::vector<Workload>& workloads() {
-  static const std::vector<Workload> all{
-      {"W1", 20, 2.0, 0.02, 0.15, 0.01}, {"W2", 40, 0.1, 0.01, 0.01, 0.002}, {"W3", 80, 0.05, 0.01, 0.004, 0.001}};
-  return all;
+/// W1, W2, W3, or one of so many particles per edge. Throws std::invalid_argument if it is neither.
+Workload workload_of(const std::string& name) {
+  const int per_edge = name == "W1" ? 20 : name == "W2" ? 40 : name == "W3" ? 80 : std::atoi(name.c_str());
+  if (per_edge < 4 || per_edge > 400) {
+    throw std::invalid_argument("--workloads must be W1, W2, W3 or 4 to 400 particles per edge, got '" + name + "'");
+  }
+  const std::string title = name.front() == 'W' ? name : name + " per edge";
+  if (per_edge <= 20) {
+    return {title, per_edge, 2.0, 0.02, 0.15, 0.01};
+  }
+  return per_edge <= 40 ? Workload{title, per_edge, 0.1, 0.01, 0.01, 0.002}
+                        : Workload{title, per_edge, 0.05, 0.01, 0.004, 0.001};
 }
 
 SimulatorSettings settings_for(int threads, double fixed_step) {
@@ -276,7 +285,7 @@ void report_runs(Report& report, const std::string& title, long particles, doubl
 template <class Parts>
 void measure(const Options& options, Report& report, const std::string& solver, const Workload& workload,
              double fixed_step) {
-  const std::string title = workload.name + " " + solver;
+  const std::string title = workload.name + ", " + solver;
   if (!report.wants(title)) {
     return;
   }
@@ -316,8 +325,8 @@ void measure(const Options& options, Report& report, const std::string& solver, 
 int main(int argc, char** argv) {
   Options options("bench_whole_step", "whole sub-steps of a cube of water that collapses");
   options.add_threads()
-      .add("workloads", "W1,W2,W3", "which of W1, W2 and W3 (8,000, 64,000 and 512,000 particles)")
-      .add("solvers", "dfsph,pbf,wcsph", "which of dfsph, pbf (of W1 only) and wcsph")
+      .add("workloads", "W1,W2,W3", "of W1, W2 and W3 (8,000, 64,000 and 512,000 particles), or particles per edge")
+      .add("solvers", "dfsph,pbf,wcsph", "of dfsph, pbf (up to W1 only) and wcsph")
       .add("repetitions", "1", "runs of each kind")
       .add("quick", "no", "a tenth of the simulated times, for a first look");
   return benchmark_main(argc, argv, options, [](const Options& given, Report& report) {
@@ -328,18 +337,14 @@ int main(int argc, char** argv) {
       }
     }
     for (const std::string& name : wanted) {
-      const auto at =
-          std::find_if(workloads().begin(), workloads().end(), [&](const Workload& w) { return w.name == name; });
-      if (at == workloads().end()) {
-        throw std::invalid_argument("--workloads must be of W1, W2 and W3, got '" + name + "'");
-      }
+      const Workload workload = workload_of(name);
       for (const std::string& solver : solvers) {
         if (solver == "dfsph") {
-          measure<decant::DefaultParts<>>(given, report, "Dfsph", *at, 0);
+          measure<decant::DefaultParts<>>(given, report, "Dfsph", workload, 0);
         } else if (solver == "wcsph") {
-          measure<decant::StateEquationParts<>>(given, report, "StateEquation", *at, 2e-4);
-        } else if (name == "W1") {
-          measure<decant::PositionBasedParts<>>(given, report, "PositionBased", *at, 0);
+          measure<decant::StateEquationParts<>>(given, report, "StateEquation", workload, 2e-4);
+        } else if (workload.per_edge <= 20) {
+          measure<decant::PositionBasedParts<>>(given, report, "PositionBased", workload, 0);
         }
       }
     }
