@@ -352,12 +352,17 @@ void measure_walls(Report& report, const Scene& scene, int threads) {
 
 int main(int argc, char** argv) {
   Options options("bench_rays_and_distances", "sight lines, hidden points, distances and walls of a mesh");
-  options.add_threads().argument("", "a mesh file in place of the cups");
+  options.add_threads()
+      .add("unit", "1", "of the mesh file's coordinates [m]; 0.001 for mm")
+      .argument("", "a mesh file in place of the cups");
   return benchmark_main(argc, argv, options, [](const Options& given, Report& report) {
     const std::vector<int> threads = given.numbers("threads");
     std::vector<decant::TriangleMesh> meshes;
     if (const std::string& file = given.text("argument"); !file.empty()) {
       meshes.push_back(decant::read_mesh(file));
+      for (Point& vertex : meshes.back().vertices) {
+        vertex *= given.number("unit");
+      }
     } else {
       meshes = {cup(50), cup(158)};
     }
