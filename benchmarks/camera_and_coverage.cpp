@@ -195,9 +195,6 @@ std::vector<Eigen::Vector2d> hypotheses(const Frames& frames) {
 template <class Field, class Direct, class SizeOf>
 void measure_sums(Report& report, const std::string& name, const Frames& frames,
                   const std::vector<Eigen::Vector2d>& places, int thread_count, Direct&& direct_sum, SizeOf&& size_of) {
-  if (!report.wants(name)) {
-    return;
-  }
   using Value = decltype(direct_sum(frames.mask[0], frames.coverage[0], places[0]));
   const Threads threads{thread_count};
   Field field(width, height);

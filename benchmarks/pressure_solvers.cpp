@@ -121,7 +121,8 @@ Solver limited_to(int most_iterations) {
 
 template <class Solver>
 void measure(Report& report, const std::string& name, const Positions& positions, int threads) {
-  if (!report.wants(name)) {
+  const std::string beside_limit = name + ", one iteration beside step_limit";
+  if (!report.wants(name) && !report.wants(beside_limit)) {
     return;
   }
   Problem<Solver> problem(positions, threads);
@@ -176,7 +177,7 @@ void measure(Report& report, const std::string& name, const Positions& positions
 
       if (!step_limit_program().empty()) {
         const int per_edge = static_cast<int>(std::lround(std::cbrt(static_cast<double>(size))));
-        Comparison beside(report, name + ", one iteration beside step_limit", size, threads);
+        Comparison beside(report, beside_limit, size, threads);
         beside.add_from_elsewhere("step_limit: DFSPH iteration, gradients stored",
                                   [=] { return step_limit_figure("DFSPH iter stored f16 AoS", per_edge, threads); });
         add(beside, of_many, [&] { problem.solve(many, true); });

@@ -294,9 +294,6 @@ void measure_distances(Report& report, const Scene& scene, int threads) {
 }
 
 void measure_walls(Report& report, const Scene& scene, int threads) {
-  if (!report.wants(scene.title("rays of wall integrals")) && !report.wants(scene.title("set-up of walls"))) {
-    return;
-  }
   constexpr std::size_t ray_count = 128;
   const BoundingVolumeHierarchy& surface = *scene.surface;
   std::mt19937 generator(1);
