@@ -128,35 +128,32 @@ void measure(Report& report, const std::string& name, const Positions& positions
   Problem<Solver> problem(positions, threads);
   const long size = positions[0].cols();
   Comparison parts(report, name, size, threads);
-  const auto add = [&](Comparison& to, const std::string& what, auto&& run,
-                       std::string note = "") -> Comparison::Case& {
-    Comparison::Case& added = to.add(
-        what, [run](std::size_t) mutable { run(); }, std::move(note));
+  const auto add = [&](Comparison & to, const std::string& what, const std::string& note, auto&& run) -> auto& {
+    Comparison::Case& added = to.add(what, [run](std::size_t) mutable { run(); });
     added.prepare = [&problem](std::size_t turn) { problem.take(turn); };
+    added.note = note;
     return added;
   };
 
-  add(parts, "sweep that reads one number", [&problem] { problem.sweep(); });
+  add(parts, "sweep that reads one number", "", [&] { problem.sweep(); });
   Solver solver, warm;
   if (seconds_of([&] { problem.begin(solver); }) > 1e-6) {  // not all have something to set up
-    add(parts, "begin_step", [&problem, &solver] { problem.begin(solver); });
+    add(parts, "begin_step", "", [&] { problem.begin(solver); });
   }
   const PressureReport done = problem.solve(solver, true);
   if (!problem.liquid().fluid.velocity.allFinite() || !(problem.liquid().fluid.pressure.maxCoeff() > 0)) {
     throw std::runtime_error(name + " left no pressure, or velocities that are not finite");
   }
-  add(
-      parts, "begin_step and solve", [&] { problem.solve(solver, true); }, in_words(done));
+  add(parts, "begin_step and solve", in_words(done), [&] { problem.solve(solver, true); });
   if constexpr (requires(PressureReport & r) { solver.correct_places(problem.liquid().view(), r); }) {
     const PressureReport all = problem.solve(solver, true, true);
-    add(
-        parts, "all of a sub-step", [&] { problem.solve(solver, true, true); }, in_words(all));
+    add(parts, "all of a sub-step", in_words(all), [&] { problem.solve(solver, true, true); });
   }
   if constexpr (!std::is_empty_v<typename Solver::Memory>) {
     problem.solve(warm, false);
     const PressureReport again = problem.solve(warm, false);
-    Comparison::Case& from_solution = add(
-        parts, "begin_step and solve from the solution", [&] { problem.solve(warm, false); }, in_words(again));
+    Comparison::Case& from_solution =
+        add(parts, "begin_step and solve from the solution", in_words(again), [&] { problem.solve(warm, false); });
     from_solution.prepare = [&](std::size_t turn) {
       problem.take(turn);
       warm.memory().clear();
@@ -170,8 +167,8 @@ void measure(Report& report, const std::string& name, const Positions& positions
     const int difference = iterations(problem.solve(many, true)) - iterations(problem.solve(few, true));
     if (difference > 0) {
       const std::string of_many = "solve with 25 iterations", of_few = "solve with 5 iterations";
-      add(parts, of_many, [&] { problem.solve(many, true); });
-      add(parts, of_few, [&] { problem.solve(few, true); });
+      add(parts, of_many, "", [&] { problem.solve(many, true); });
+      add(parts, of_few, "", [&] { problem.solve(few, true); });
       parts.add_difference("one iteration", of_many, of_few, difference);
       parts.run();
 
@@ -180,8 +177,8 @@ void measure(Report& report, const std::string& name, const Positions& positions
         Comparison beside(report, beside_limit, size, threads);
         beside.add_from_elsewhere("step_limit: DFSPH iteration, gradients stored",
                                   [=] { return step_limit_figure("DFSPH iter stored f16 AoS", per_edge, threads); });
-        add(beside, of_many, [&] { problem.solve(many, true); });
-        add(beside, of_few, [&] { problem.solve(few, true); });
+        add(beside, of_many, "", [&] { problem.solve(many, true); });
+        add(beside, of_few, "", [&] { problem.solve(few, true); });
         beside.add_difference("one iteration", of_many, of_few, difference);
         beside.run();
       }
