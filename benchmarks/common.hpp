@@ -1,60 +1,30 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// What all benchmarks share: a clock, medians, test liquids, a test cup, and rows of CSV that name the circumstances.
+/// How all benchmarks measure: cases are compared with a reference that runs beside them, in turns. Test liquids and
+/// meshes are in inputs.hpp.
+///
+/// Why not Google Benchmark: it runs one case after the other. Clock rates and neighbours on the same processor drift
+/// by more than most differences of interest, and only what runs in turns sees the same drift.
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdint>
+#include <cstddef>
 #include <cstdio>
-#include <fstream>
+#include <deque>
+#include <exception>
 #include <functional>
-#include <random>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include <decant/boundary/triangle_mesh.hpp>
-#include <decant/core/batch.hpp>
-#include <decant/core/parallel.hpp>
-#include <decant/core/types.hpp>
+#include <decant/core/expects.hpp>
+
+#include "command_line.hpp"
+#include "report.hpp"
 
 namespace decant_benchmark {
-
-using decant::Index;
-
-/// Seconds per call of f: median, and half the distance between the quartiles.
-struct Timing {
-  int repetitions = 0;
-  double median = 0;
-  double spread = 0;
-  double fastest = 0;
-};
-
-/// Calls f once to warm up, then in batches of at least 2 ms until `seconds` are over, and at least 7 times.
-template <class Function>
-Timing time_of(Function&& f, double seconds = 0.6) {
-  using Clock = std::chrono::steady_clock;
-  const auto since = [](Clock::time_point start) {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
-  f();
-  const Clock::time_point first = Clock::now();
-  f();
-  const int calls = std::clamp(static_cast<int>(2e-3 / std::max(since(first), 1e-9)), 1, 1000000);
-  std::vector<double> times;
-  const Clock::time_point begin = Clock::now();
-  while (times.size() < 7 || (since(begin) < seconds && times.size() < 1000)) {
-    const Clock::time_point start = Clock::now();
-    for (int k = 0; k < calls; ++k) {
-      f();
-    }
-    times.push_back(since(start) / calls);
-  }
-  std::sort(times.begin(), times.end());
-  const std::size_t n = times.size();
-  return {static_cast<int>(n) * calls, times[n / 2], (times[n - 1 - n / 4] - times[n / 4]) / 2, times[0]};
-}
 
 /// Keeps a result from being optimised away.
 template <class Value>
@@ -62,116 +32,162 @@ void keep(const Value& value) {
   asm volatile("" : : "g"(&value) : "memory");
 }
 
-inline std::string compiler() {
-#if defined(__clang__)
-  return "clang " + std::to_string(__clang_major__) + "." + std::to_string(__clang_minor__);
-#else
-  return "gcc " + std::to_string(__GNUC__) + "." + std::to_string(__GNUC_MINOR__);
-#endif
+/// Wall time of f() [s].
+template <class Function>
+double seconds_of(Function&& f) {
+  const auto start = std::chrono::steady_clock::now();
+  f();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// What the compiler may assume of the processor, as far as decant cares.
-inline std::string flags() {
-  using decant::detail::vector_unit;
-  using decant::detail::VectorUnit;
-  std::string text = vector_unit == VectorUnit::Avx512 ? "AVX-512"
-                     : vector_unit == VectorUnit::Avx2 ? "AVX2"
-                                                       : "baseline";
-#if !defined(__OPTIMIZE__)
-  text += " not optimised";
-#endif
-#if !defined(_OPENMP)
-  text += " no OpenMP";
-#endif
-  return text;
-}
+/// What times are reported in.
+struct Unit {
+  const char* name;
+  double per_second;
+};
+inline constexpr Unit milliseconds{"ms", 1e3};
 
-inline std::string processor() {
-  std::ifstream info("/proc/cpuinfo");
-  std::string line;
-  while (std::getline(info, line)) {
-    if (line.rfind("model name", 0) == 0 && line.find(": ") != std::string::npos) {
-      std::string name = line.substr(line.find(": ") + 2);
-      std::replace(name.begin(), name.end(), ',', ' ');
-      return name;
-    }
-  }
-  return "unknown";
-}
-
-/// Prints the header once, then one row per result.
-class Csv {
+/// Cases that do the same thing in different ways, or parts of one thing, measured in turns: A B C, C B A, ... A sample
+/// is a batch of calls of at least 2 ms.
+class Comparison {
  public:
-  void row(const std::string& name, int threads, Index particles, double neighbors, const Timing& timing,
-           const std::string& note = "") {
-    if (!started_) {
-      std::printf(
-          "name,compiler,flags,cpu,threads,particles,neighbors,repetitions,median_ms,spread_ms,fastest_ms,note\n");
-      started_ = true;
+  /// run(turn) is what is timed. Calls of one sample count `turn` up, and samples of one round begin alike: a case with
+  /// inputs takes inputs[turn % inputs.size()], with 16 inputs or more, since a processor learns the branches of one.
+  using Call = std::function<void(std::size_t turn)>;
+
+  struct Case {
+    std::string name;
+    Call run{};
+    Call prepare{};    ///< called before each sample, not timed; then all calls of a sample have one input
+    double scale = 1;  ///< the time of a call times this is what is reported
+    std::string note{};
+    int calls = 1;                                 ///< per sample
+    std::vector<double> seconds{};                 ///< per call, scaled: one for each round
+    std::function<double()> measured_elsewhere{};  ///< a sample by another program, in place of run [s]
+  };
+
+  Comparison(Report& report, std::string title, long size, int threads, Unit unit = milliseconds)
+      : report_(report), title_(std::move(title)), size_(size), threads_(threads), unit_(unit) {}
+
+  /// The case returned may be completed until run(). The first one added is the reference.
+  Case& add(std::string name, Call run, std::string note = "") {
+    Case& added = cases_.emplace_back(Case{std::move(name), std::move(run)});
+    added.note = std::move(note);
+    return added;
+  }
+
+  /// A case that another program measures; called once in each round [s].
+  Case& add_from_elsewhere(std::string name, std::function<double()> sample) {
+    Case& added = add(std::move(name), {});
+    added.measured_elsewhere = std::move(sample);
+    return added;
+  }
+
+  /// (time of `more` - time of `less`) / parts, round by round: what one of several equal parts takes.
+  Case& add_difference(std::string name, const std::string& more, const std::string& less, double parts) {
+    differences_.push_back({name, more, less, parts});
+    return add(std::move(name), {});
+  }
+
+  /// Measures all cases and reports them.
+  void run() {
+    if (cases_.empty() || !report_.wants(title_)) {
+      return;
     }
-    std::printf("%s,%s,%s,%s,%d,%ld,%.1f,%d,%.6g,%.2g,%.6g,%s\n", name.c_str(), compiler().c_str(), flags().c_str(),
-                processor_.c_str(), threads, static_cast<long>(particles), neighbors, timing.repetitions,
-                1e3 * timing.median, 1e3 * timing.spread, 1e3 * timing.fastest, note.c_str());
-    std::fflush(stdout);
+    measure();
+    for (const Difference& difference : differences_) {
+      const std::vector<double>&more = find(difference.more).seconds, &less = find(difference.less).seconds;
+      for (std::size_t round = 0; round < more.size(); ++round) {
+        find(difference.name).seconds.push_back((more[round] - less[round]) / difference.parts);
+      }
+    }
+    report_.heading(title_, size_, threads_);
+    const Case& reference = cases_.front();
+    for (const Case& c : cases_) {
+      std::vector<double> ratios;
+      for (std::size_t round = 0; round < c.seconds.size(); ++round) {
+        ratios.push_back(c.seconds[round] / reference.seconds[round]);
+      }
+      report_.add(title_, {c.name, size_, threads_, unit_.per_second * Spread(c.seconds), unit_.name, Spread(ratios),
+                           reference.name, c.note});
+    }
   }
 
  private:
-  bool started_ = false;
-  std::string processor_ = processor();
+  struct Difference {
+    std::string name, more, less;
+    double parts;
+  };
+
+  Case& find(const std::string& name) {
+    const auto at = std::find_if(cases_.begin(), cases_.end(), [&](const Case& c) { return c.name == name; });
+    decant::expects(at != cases_.end(), "Comparison: case", "one that was added", name);
+    return *at;
+  }
+
+  static double sample(Case& c, std::size_t turn, int calls) {
+    if (c.measured_elsewhere) {
+      return c.measured_elsewhere();
+    }
+    if (c.prepare) {
+      c.prepare(turn);
+    }
+    const double seconds = seconds_of([&] {
+      for (int k = 0; k < calls; ++k) {
+        c.run(turn + static_cast<std::size_t>(k));
+      }
+    });
+    return c.scale * seconds / calls;
+  }
+
+  void measure() {
+    std::vector<Case*> timed;
+    for (Case& c : cases_) {
+      if (c.run) {
+        sample(c, 0, 1);  // to warm up: buffers grow, pages are touched
+        c.calls = static_cast<int>(std::clamp(2e-3 * c.scale / std::max(sample(c, 1, 1), 1e-9), 0.0, 1e6)) + 1;
+      }
+      if (c.run || c.measured_elsewhere) {
+        timed.push_back(&c);
+      }
+    }
+    const double budget = report_.seconds() * static_cast<double>(timed.size());
+    double spent = 0;
+    for (std::size_t round = 0; round < 7 || (spent < budget && round < 1000); ++round) {
+      spent += seconds_of([&] {
+        for (Case* const c : timed) {
+          c->seconds.push_back(sample(*c, round, c->calls));
+        }
+      });
+      std::reverse(timed.begin(), timed.end());  // so that a drift within a round favours nobody
+    }
+  }
+
+  Report& report_;
+  std::string title_;
+  long size_;
+  int threads_;
+  Unit unit_;
+  std::deque<Case> cases_{};  // references to cases stay valid
+  std::vector<Difference> differences_{};
 };
 
-/// per_edge^3 particles of a liquid at rest, in general position: a lattice, jittered by a tenth of the spacing [m],
-/// turned against the axes, in random order. A lattice along the axes would flatter cell grids by a fifth.
-template <class Scalar>
-decant::PointArray<Scalar> resting_liquid(Index per_edge, double spacing) {
-  using decant::Vector3;
-  std::mt19937 generator(1);
-  std::uniform_real_distribution<double> jitter(-0.1, 0.1);
-  const decant::Matrix3<double> turn =
-      (Eigen::AngleAxisd(0.9, Vector3<double>::UnitZ()) * Eigen::AngleAxisd(0.5, Vector3<double>::UnitX()) *
-       Eigen::AngleAxisd(0.3, Vector3<double>::UnitY()))
-          .toRotationMatrix();
-  decant::PointArray<Scalar> position(3, per_edge * per_edge * per_edge);
-  for (Index i = 0; i < position.cols(); ++i) {
-    const Vector3<double> corner(static_cast<double>(i % per_edge), static_cast<double>(i / per_edge % per_edge),
-                                 static_cast<double>(i / per_edge / per_edge));
-    const Vector3<double> shift(jitter(generator), jitter(generator), jitter(generator));
-    position.col(i) = (turn * (corner + shift) * spacing).template cast<Scalar>();
-  }
-  for (Index i = position.cols() - 1; i > 0; --i) {
-    position.col(i).swap(position.col(static_cast<Index>(generator() % static_cast<unsigned>(i + 1))));
-  }
-  return position;
-}
-
-/// A cup with 3 mm walls, 0.09 m high, whose outline has `steps` pieces and is turned in as many: 2 steps^2 triangles.
-inline decant::TriangleMesh cup(std::uint32_t steps) {
-  const std::vector<Eigen::Vector2d> outline{{0.001, -0.003}, {0.033, -0.003}, {0.043, 0.09},
-                                             {0.040, 0.09},   {0.030, 0},      {0.001, 0}};
-  double length = 0;
-  for (std::size_t k = 0; k < outline.size(); ++k) {
-    length += (outline[(k + 1) % outline.size()] - outline[k]).norm();
-  }
-  decant::TriangleMesh mesh;
-  for (std::uint32_t i = 0; i < steps; ++i) {
-    double way = length * i / steps;
-    std::size_t piece = 0;
-    const auto size = [&] { return (outline[(piece + 1) % outline.size()] - outline[piece]).norm(); };
-    while (way > size()) {
-      way -= size();
-      ++piece;
+/// The body of a main(): parses the command line, calls body(options, report), and turns what is thrown into one line.
+template <class Body>
+int benchmark_main(int count, char** arguments, Options options, Body&& body) {
+  try {
+    if (options.parse(count, arguments)) {
+      Report report(options);
+      body(static_cast<const Options&>(options), report);
+      if (report.empty()) {
+        throw std::invalid_argument("nothing to measure: no title contains '" + options.text("only") + "'");
+      }
     }
-    const Eigen::Vector2d at = outline[piece] + way / size() * (outline[(piece + 1) % outline.size()] - outline[piece]);
-    for (std::uint32_t j = 0; j < steps; ++j) {
-      const double turn = 2 * 3.14159265358979 * j / steps;
-      mesh.vertices.emplace_back(at.x() * std::cos(turn), at.x() * std::sin(turn), at.y());
-      const std::uint32_t next_i = (i + 1) % steps;
-      const std::uint32_t next_j = (j + 1) % steps;
-      mesh.triangles.push_back({i * steps + j, i * steps + next_j, next_i * steps + j});
-      mesh.triangles.push_back({i * steps + next_j, next_i * steps + next_j, next_i * steps + j});
-    }
+    return 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", options.program().c_str(), error.what());
+    return 2;
   }
-  return mesh;
 }
 
 }  // namespace decant_benchmark
