@@ -18,13 +18,14 @@ endfunction()
 foreach(line IN ITEMS "#include <iostream>" "#include <fstream>" "inline void f() { std::printf(\"\"), 0 }"
         "#include <png.h>" "#include <decant/io/scene.hpp>" "#include <nanoflann.hpp>" "#include <omp.h>"
         "#pragma omp parallel for" "using namespace std" "#define SQUARE(x) x" "#define DECANT_SQUARE(x) x"
-        "namespace decant {" "namespace decant::detail {" "namespace decant::DECANT_TARGET {")
+        "namespace decant {" "namespace decant::detail {" "namespace decant::inline DECANT_TARGET {")
   try(core/part.hpp "${start}${line}\n" TRUE)
 endforeach()
 try(core/part.hpp "#include <vector>\n" TRUE)
 try(version.hpp "${start}#define VERSION 1\n" TRUE)
 try(core/part.hpp "${start}// not <iostream>\n#include <vector> // no #include <omp.h>\n" FALSE)
-try(core/part.hpp "${start}#include <decant/core/target.hpp>\nnamespace decant::DECANT_TARGET {}\n" FALSE)
+try(core/part.hpp "${start}#include <decant/core/target.hpp>\nnamespace decant::inline DECANT_TARGET {}\n" FALSE)
+try(core/part.hpp "${start}#include <decant/core/target.hpp>\nnamespace decant::DECANT_TARGET {\n" TRUE)
 try(io/part.hpp "${start}#include <fstream>\n" FALSE)
 try(version.hpp "${start}#define DECANT_VERSION 1\n" FALSE)
 try(neighbor/kd_tree.hpp "${start}#include <nanoflann.hpp>\n" FALSE)

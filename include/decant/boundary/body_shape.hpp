@@ -11,7 +11,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A body's shape: its surface, and its solids where it is put together from simple ones (then wall integrals are in
 /// closed form; the surface is used for swept contact, sight lines and pictures).
@@ -71,4 +71,4 @@ struct BodyShape {
   BodyShape(const Bowl& bowl) : mesh(bowl.mesh()) {}
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

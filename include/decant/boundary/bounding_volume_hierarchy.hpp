@@ -25,7 +25,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace detail {
 
@@ -691,4 +691,4 @@ inline bool BoundingVolumeHierarchy::inside_material(const Vector3<double>& x) c
   return votes_inside > votes_outside;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -22,7 +22,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The region of a body that holds liquid when `up` (in the body's frame) is up: of all places that keep liquid below
 /// their own rim, the one that holds most. A closed hollow counts as a whole; it is chosen if no open place holds a
@@ -528,4 +528,4 @@ inline void Cavity::choose(const Pieces& pieces) {
   }
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

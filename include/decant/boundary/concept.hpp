@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Names a body of a simulation; as an Origin, the liquid that started in it.
 using BodyId = std::uint32_t;
@@ -86,4 +86,4 @@ concept Boundary =
       { built.guard(position, number, threads, sampled, fluid) } noexcept -> std::same_as<GuardReport>;
     };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

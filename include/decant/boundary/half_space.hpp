@@ -10,7 +10,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Integrals of a smoothing kernel over the half-space behind a plane, as functions of the particle's distance a [m] to
 /// that plane (negative behind it). With the wall taken as filled to rest density, fraction(a) is its share of a
@@ -94,4 +94,4 @@ class HalfSpace {
   std::vector<double> slope_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

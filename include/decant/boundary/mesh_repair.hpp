@@ -20,7 +20,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What repair did.
 struct RepairReport {
@@ -239,4 +239,4 @@ inline TriangleMesh repaired(const TriangleMesh& mesh, double spacing) {
   return repaired(mesh, spacing, report);
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -23,7 +23,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Findings about a mesh. Edges are counted after vertices at equal places were merged.
 struct MeshReport {
@@ -250,4 +250,4 @@ inline MeshReport inspect(const TriangleMesh& mesh, double spacing, const Vector
   return report;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

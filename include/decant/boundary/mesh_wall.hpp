@@ -21,7 +21,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What lies in the shadow of a mesh: the integral of the wall's weight (WallFunction) over all points that the surface
 /// hides from the particle. Along a ray in direction u that meets the surface at distance t, the radial part is known
@@ -445,4 +445,4 @@ class MeshWall {
   std::vector<std::unique_ptr<Block>> block_data_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

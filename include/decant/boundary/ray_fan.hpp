@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// `Count` directions, a multiple of 8, that are asked for together again and again. first_hits answers what
 /// BoundingVolumeHierarchy::first_hit does for each ray, several times as fast where rays are short: the triangles
@@ -300,4 +300,4 @@ class RayFan {
   std::array<double, padded_count> cosine_{}, sine_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

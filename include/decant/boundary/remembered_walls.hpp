@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Where particles and bodies were when a WallState was sampled last. Bodies without sample_again (boundary/concept.hpp
 /// does not ask for it) are sampled from the beginning each time; results are the same bits either way.
@@ -92,4 +92,4 @@ class RememberedWalls {
   Growable<Scalar, 3> position_before_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

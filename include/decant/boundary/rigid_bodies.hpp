@@ -35,7 +35,7 @@
 #include <decant/core/types.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A set of rigid bodies, each with a pose at any time.
 /// MeshWallType decides how the liquid feels meshes: MeshWall (shadow integrals) or SampledWall (boundary particles).
@@ -452,4 +452,4 @@ class RigidBodies {
 static_assert(Boundary<RigidBodies<float>, CubicSpline<float>>);
 static_assert(Boundary<RigidBodies<double>, CubicSpline<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// After Akinci, Ihmsen, Akinci, Solenthaler and Teschner 2012, "Versatile rigid-fluid coupling for incompressible SPH"
 /// (ACM TOG 31): the surface is covered with boundary particles b, and with volumes V_b = 1 / sum_c W(x_b - x_c), which
@@ -273,4 +273,4 @@ class SampledWall {
   std::vector<std::size_t> first_{};  ///< of each bucket, and the end
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

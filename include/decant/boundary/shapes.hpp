@@ -21,7 +21,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A side of a box; of a cylinder along z, only the last two.
 enum class Face { NegativeX, PositiveX, NegativeY, PositiveY, NegativeZ, PositiveZ };
@@ -431,4 +431,4 @@ struct Bowl {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

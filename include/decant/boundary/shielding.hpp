@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Takes out of a neighbour list the pairs that a body's wall separates. Few pairs near walls are,
 /// so what walls do to particles (WallState) answers two cheap questions first, a batch of neighbours at a time: a pair
@@ -139,4 +139,4 @@ class WallShield {
   std::vector<std::uint8_t> suspect_{};  ///< of being separated from a neighbour
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -17,7 +17,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The surface point of a solid that is closest to a given point.
 struct SurfacePoint {
@@ -192,4 +192,4 @@ class SolidParts {
   double blend_ = 0;  ///< how far a part must stand out of another's plane to count in full [m]
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -7,7 +7,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a path needed in order to stay on its side.
 enum class SweptResult {
@@ -50,4 +50,4 @@ inline SweptResult keep_on_side(const BoundingVolumeHierarchy& surface, const Ve
   return result;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

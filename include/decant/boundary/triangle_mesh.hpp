@@ -18,7 +18,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Triangles over shared vertices, in the frame of the body they belong to. A triangle's front is where its corners
 /// run counter-clockwise; on the surface of a solid the front looks out of the material.
@@ -149,4 +149,4 @@ inline TriangleMesh welded(const TriangleMesh& mesh) {
   return result;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

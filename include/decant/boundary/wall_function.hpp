@@ -9,7 +9,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A wall takes part in the density sum as a region behind its surface, with a weight of its own instead of the kernel.
 /// At distance a from a plane it adds, in units of rest density,
@@ -120,4 +120,4 @@ class WallFunction {
   double power_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

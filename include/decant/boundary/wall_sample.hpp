@@ -6,7 +6,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The wall is everything that a straight line from the particle reaches only through the body's surface: a thin wall
 /// shields what lies behind it, so a cup of paper and a cup of stone feel alike from inside.
@@ -19,4 +19,4 @@ struct WallSample {
   double distance = 0;  ///< to the nearest point of the surface [m]
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A wall's part in one particle's sums. Gradients are those of the share, so they point into the wall.
 template <class Scalar>
@@ -67,4 +67,4 @@ struct WallState {
   WallContact<Scalar>* contacts_of(Index i) { return &contacts[static_cast<std::size_t>(i) * max_contacts]; }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -11,7 +11,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// x -> A x + b from one image's pixels to another's; always invertible. Named like a pose, image_from_thermal: the
 /// recording format's affine_to_image takes a thermal pixel (u, v) to the colour image's pixel.
@@ -67,4 +67,4 @@ class AffineMap {
   Matrix matrix_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A camera whose image is an affine map of another camera's: pixel_in_first = A * (pixel_in_second, 1), A being
 /// `first_from_second`, the 2x3 matrix that recordings call `affine_to_image` (thermal pixel to image pixel). The
@@ -84,4 +84,4 @@ class AffineRegisteredCamera {
 };
 static_assert(CameraModel<AffineRegisteredCamera<PinholeCamera>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 struct AffineFitSettings {
   bool refuse_outliers = true;  ///< false: least squares over all pairs
@@ -261,4 +261,4 @@ inline Index affine_fit_check(const Points2& from, const Points2& to, const Affi
   return fit;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

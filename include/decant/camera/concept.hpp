@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Where a point falls in an image.
 struct Projection {
@@ -69,4 +69,4 @@ inline bool before_camera(const Vector3<double>& x) noexcept {
 
 }  // namespace detail
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -24,7 +24,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// An image of depths along the optical axis [m]. Per frame: clear(), then draw() every body that cannot be looked
 /// through; or accept() an image. Both allocate nothing.
@@ -292,4 +292,4 @@ class DepthBuffer {
 };
 static_assert(Occlusion<DepthBuffer<PinholeCamera>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

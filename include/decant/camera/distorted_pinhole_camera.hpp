@@ -12,7 +12,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Coefficients of the lens model "plumb_bob" (D. C. Brown 1966; J.-Y. Bouguet's calibration toolbox), in the order of
 /// OpenCV's and ROS's arrays. All are without unit.
@@ -193,4 +193,4 @@ class DistortedPinholeCamera {
 };
 static_assert(CameraModel<DistortedPinholeCamera>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

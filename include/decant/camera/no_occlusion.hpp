@@ -7,7 +7,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Nothing is hidden.
 struct NoOcclusion {
@@ -15,4 +15,4 @@ struct NoOcclusion {
 };
 static_assert(Occlusion<NoOcclusion>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Knows a camera, its pose, and the bodies before it. hidden(x_in_world [m]) says whether a body stands between the
 /// camera and the point, on the point's line of sight: from where sight begins (CameraModel::unproject(pixel, 0)) to
@@ -56,4 +56,4 @@ void find_hidden(const OcclusionType& occlusion, const ConstPointsView<float>& p
   detail::find_hidden<OcclusionType, float>(occlusion, position, threads, hidden);
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Parallel projection along z, for views from far away and for sections: u = s x + cx, v = s y + cy. Sees what lies
 /// before its image plane z = 0.
@@ -71,4 +71,4 @@ class OrthographicCamera {
 };
 static_assert(CameraModel<OrthographicCamera>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

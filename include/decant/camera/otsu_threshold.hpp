@@ -15,7 +15,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A split of pixel values in two.
 struct OtsuThreshold {
@@ -113,4 +113,4 @@ std::optional<OtsuThreshold> otsu_threshold(const Eigen::ArrayBase<Derived>& ima
   return histogram.otsu();
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Central projection: u = fx x/z + cx, v = fy y/z + cy.
 class PinholeCamera {
@@ -66,4 +66,4 @@ class PinholeCamera {
 };
 static_assert(CameraModel<PinholeCamera>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A camera in the world: answers a camera's questions for points in world coordinates. A value, as the camera is; all
 /// const functions may be called from any thread, and none but the constructor throws or allocates.
@@ -77,4 +77,4 @@ class PosedCamera {
   Matrix3<double> rotation_ = Matrix3<double>::Identity();  // of camera_from_world_, ready for many points
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -27,7 +27,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Sight lines against bounding-volume hierarchies (Schenck and Fox 2017, section IV). Rays go into each body's frame,
 /// so a body that moves costs a pose and nothing is built anew. Exact for every camera; surfaces hide from both sides.
@@ -251,4 +251,4 @@ class RayOcclusion {
 };
 static_assert(Occlusion<RayOcclusion<PinholeCamera>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

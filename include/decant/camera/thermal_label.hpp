@@ -19,7 +19,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What thermal cameras deliver: raw counts of 8 or 16 bits, or temperatures.
 template <class P>
@@ -164,4 +164,4 @@ class ThermalLabel {
   AffineMap thermal_from_image_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -21,7 +21,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace detail {
 
@@ -716,4 +716,4 @@ template <std::floating_point Scalar>
   return detail::compress_bits<Scalar>(to, from, mask.bits());
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -10,7 +10,7 @@
 #include <decant/core/batch.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 #if defined(__AVX512F__) || defined(__F16C__)
 inline constexpr bool has_half_precision = true;
@@ -68,4 +68,4 @@ template <std::floating_point Scalar>
   }
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

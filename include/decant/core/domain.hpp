@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Ordinary space.
 struct OpenDomain {
@@ -92,4 +92,4 @@ class PeriodicDomain {
   Vector3<Scalar> inverse_ = Vector3<Scalar>::Zero();
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

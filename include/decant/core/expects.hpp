@@ -10,7 +10,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace detail {
 
@@ -34,4 +34,4 @@ void expects(bool holds, std::string_view what, std::string_view expected, const
   }
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

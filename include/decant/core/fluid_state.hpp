@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Where a particle came from: the number of a body it was filled into or of an inlet, as the simulation handed it out.
 using Origin = std::uint32_t;
@@ -57,4 +57,4 @@ struct FluidState {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A matrix with a fixed number of rows and one column per particle; owns its memory, which is contiguous and column
 /// by column. Reads and writes as the Eigen::Map that it is. Views of it are invalidated by set_count.
@@ -75,4 +75,4 @@ class Growable : public Eigen::Map<std::conditional_t<Rows == 1, Eigen::Matrix<S
   std::vector<Scalar> storage_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

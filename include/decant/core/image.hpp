@@ -10,7 +10,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// An image that owns its pixels.
 template <class T>
@@ -36,4 +36,4 @@ inline constexpr std::uint8_t mask_liquid = 255;  ///< what decant writes where 
 /// reads as one.
 constexpr bool is_liquid(std::uint8_t value) noexcept { return value >= 128; }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// How many threads a call may use; 0 means all that the machine offers.
 struct Threads {
@@ -98,4 +98,4 @@ class Reduction {
   std::vector<Value> partial_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

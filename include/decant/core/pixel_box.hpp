@@ -7,7 +7,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Columns [u_begin, u_end) and rows [v_begin, v_end) [px]; empty by default.
 struct PixelBox {
@@ -45,4 +45,4 @@ struct PixelBox {
   bool operator==(const PixelBox&) const = default;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

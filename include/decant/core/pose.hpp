@@ -11,7 +11,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Takes points of the body's frame to the world: x_in_world = rotation * x_in_body + translation.
 struct Pose {
@@ -118,4 +118,4 @@ class PoseTrack {
   std::vector<Sample> samples_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -7,7 +7,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Adds the time from its construction to its end to a total [ms]. Reading the clock twice takes some 50 ns.
 class Stopwatch {
@@ -24,4 +24,4 @@ class Stopwatch {
   Clock::time_point start_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -32,7 +32,7 @@
 #define DECANT_TARGET scalar
 #endif
 
-// That it is inline is said here, for all headers: they write namespace decant::DECANT_TARGET.
+// Headers write namespace decant::inline DECANT_TARGET; for those who look before the first of them:
 namespace decant {
 inline namespace DECANT_TARGET {}
 }  // namespace decant

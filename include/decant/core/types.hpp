@@ -8,7 +8,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 using Index = Eigen::Index;
 
@@ -33,4 +33,4 @@ using PointsView = Eigen::Ref<PointArray<Scalar>>;
 template <class Scalar>
 using ConstPointsView = Eigen::Ref<const PointArray<Scalar>>;
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a correction did.
 struct CorrectionReport {
@@ -34,4 +34,4 @@ concept Corrector = requires(C& corrector, FluidState<typename C::Scalar>& fluid
   { corrector.reset() } noexcept;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

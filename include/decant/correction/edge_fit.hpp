@@ -20,7 +20,7 @@
 #include <decant/correction/silhouettes.hpp>
 #include <decant/coverage/detail/mask_disagreement.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of EdgeFit.
 struct EdgeFitSettings {
@@ -242,4 +242,4 @@ class EdgeFit {
 };
 static_assert(Corrector<EdgeFit<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -19,7 +19,7 @@
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of MapFilter.
 struct MapFilterSettings {
@@ -202,4 +202,4 @@ class MapFilter {
 };
 static_assert(Corrector<MapFilter<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

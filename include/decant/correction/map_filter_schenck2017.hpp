@@ -16,7 +16,7 @@
 #include <decant/coverage/activation.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of MapFilterSchenck2017.
 struct MapFilterSchenck2017Settings {
@@ -120,4 +120,4 @@ class MapFilterSchenck2017 {
 };
 static_assert(Corrector<MapFilterSchenck2017<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

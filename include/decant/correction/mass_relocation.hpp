@@ -21,7 +21,7 @@
 #include <decant/coverage/detail/liquid_box.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of MassRelocation. Pixels are those of the image.
 struct MassRelocationSettings {
@@ -355,4 +355,4 @@ class MassRelocation {
 };
 static_assert(Corrector<MassRelocation<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

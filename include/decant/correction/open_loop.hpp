@@ -8,7 +8,7 @@
 #include <decant/correction/concept.hpp>
 #include <decant/correction/silhouettes.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 template <class ScalarType = float, class CameraType = DistortedPinholeCamera>
 struct OpenLoop {
@@ -20,4 +20,4 @@ struct OpenLoop {
 };
 static_assert(Corrector<OpenLoop<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/correction/mass_relocation.hpp>
 #include <decant/correction/transport_corrector.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The first half of the transport's passes brings what was predicted to where it was seen, as far as it is the same
 /// liquid; what then is seen and not simulated, or the other way round, is in the wrong place, and is relocated; the
@@ -64,4 +64,4 @@ class SilhouetteCorrector {
 };
 static_assert(Corrector<SilhouetteCorrector<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

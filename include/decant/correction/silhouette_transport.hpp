@@ -20,7 +20,7 @@
 #include <decant/core/types.hpp>
 #include <decant/coverage/detail/liquid_box.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of SilhouetteTransport. Lengths are in pixels of the image.
 struct SilhouetteTransportSettings {
@@ -349,4 +349,4 @@ class SilhouetteTransport {
   Index nodes_x_ = 0, nodes_y_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// One camera in one frame. Owns nothing; images are the camera's height x width.
 template <class CameraType>
@@ -43,4 +43,4 @@ struct Silhouettes {
   Threads threads{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/correction/silhouette_transport.hpp>
 #include <decant/correction/silhouettes.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// One pass of TransportCorrector.
 struct TransportPass {
@@ -166,4 +166,4 @@ class TransportCorrector {
 };
 static_assert(Corrector<TransportCorrector<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 #include <decant/neighbor/cell_grid.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of WarpFieldSchenck2017.
 struct WarpFieldSchenck2017Settings {
@@ -117,4 +117,4 @@ class WarpFieldSchenck2017 {
 };
 static_assert(Corrector<WarpFieldSchenck2017<>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -13,7 +13,7 @@
 #include <decant/coverage/detail/liquid_weights.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Psi(p) = sum over the mask's liquid pixels q of W(|p - q|) / (Phi(q) + 1), with the coverage Phi (Schenck & Fox
 /// 2017), summed as it stands: the reference, 31,000 terms. @param pixel anywhere in the image or beyond, between
@@ -64,4 +64,4 @@ class ActivationField {
   detail::KernelGrid<false> grid_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

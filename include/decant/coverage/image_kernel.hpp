@@ -7,7 +7,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// W(d) = exp(-(d / length_px)^2) for d <= cut_px, 0 beyond; d is the distance in the image [px] (Schenck & Fox 2017).
 /// At the cut of the defaults W falls from 1.03e-4 to zero.
@@ -21,4 +21,4 @@ struct ImageKernel {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

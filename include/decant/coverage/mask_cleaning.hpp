@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Two filters in a row. A pixel is liquid if more than half of the square window around it is, which removes salt and
 /// pepper and smooths edges; pixels beyond the image's border have no vote. Then 8-connected regions of liquid that are
@@ -172,4 +172,4 @@ class MaskCleaning {
   std::vector<Run> runs_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Which pixels of a mask a distance leads to.
 enum class MaskPart { Liquid, Background };
@@ -150,4 +150,4 @@ class SilhouetteDistance {
   std::vector<Parabola> envelopes_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

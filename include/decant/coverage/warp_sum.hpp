@@ -15,7 +15,7 @@
 #include <decant/coverage/detail/liquid_weights.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// sum over the mask's liquid pixels q of u W(|u|) / (Phi(q) + 1) with u = q - p [px], summed as it stands: the
 /// reference. The warp field of Schenck & Fox 2017 is lambda times this. u is the vector as the formula prints it, not
@@ -63,4 +63,4 @@ class WarpSumField {
   detail::KernelGrid<true> grid_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/force/step_view.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// An acceleration of the liquid other than pressure. A plain value: settings inside, defaults for everything.
 /// accumulate(step, acceleration): adds the term's acceleration [m/s^2] to each column of `acceleration`, 3xN, and
@@ -27,4 +27,4 @@ concept ForceTerm = requires(F& force, const Step& step, PointArray<typename Ste
   { force.largest_step(step) } noexcept -> std::same_as<typename Step::Scalar>;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

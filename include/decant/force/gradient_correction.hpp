@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// One symmetric matrix L_i per particle, close to the inverse of
 ///   A_i = sum_j V_j (-W'/r) r r^T + sum over walls of |grad s| a n n^T,    r = x_i - x_j
@@ -138,4 +138,4 @@ class GradientCorrection {
   std::vector<Scalar> first_{}, second_{};  ///< records of four: xx, xy, xz and yy, yz, zz, the last one unused
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -8,7 +8,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The same acceleration for every particle.
 template <class ScalarType>
@@ -28,4 +28,4 @@ struct Gravity {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

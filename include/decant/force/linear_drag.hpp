@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// a = -rate (v - medium): a stand-in for what takes speed out of liquid and is not resolved, such as the air around
 /// a jet that breaks up. Taken over a sub-step as a whole, so that speed falls as exp(-rate t) however long sub-steps
@@ -37,4 +37,4 @@ struct LinearDrag {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

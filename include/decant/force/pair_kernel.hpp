@@ -11,7 +11,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Slopes that forces and pressure take gradients from, and the densities that the kernel adds up to: with them,
 ///   grad W_ij = slope x_ij,   slope = W'(r) / r [m^-5]
@@ -57,4 +57,4 @@ class PairKernel {
   Scalar common_mass_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

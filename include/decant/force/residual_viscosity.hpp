@@ -17,7 +17,7 @@
 #include <decant/core/types.hpp>
 #include <decant/force/detail/pair_stiffness.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Numerical viscosity that acts on velocity differences only so far as they are not linear in space:
 ///   a_i = 10 nu sum_j (m_j / rho_0) (e_ij . x_ij) / (r^2 + 0.01 h^2) grad W_ij,   e_ij = v_ij - (G_i + G_j) x_ij / 2
@@ -200,4 +200,4 @@ struct ResidualViscosity {
   Reduction<Scalar> largest_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

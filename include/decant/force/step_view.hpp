@@ -14,7 +14,7 @@
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/pair_kernel.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Everything is as of the start of the sub-step: densities, neighbours and walls belong to fluid.position.
 /// Does not own what it refers to; valid during one sub-step.
@@ -44,4 +44,4 @@ struct StepView {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

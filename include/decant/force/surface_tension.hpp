@@ -16,7 +16,7 @@
 #include <decant/core/types.hpp>
 #include <decant/force/detail/pair_stiffness.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The gradient of the liquid's volume fraction, n_i = sum_j V_j grad W_ij + wall share (V = m / rho_0), points into
 /// the liquid, is large at the surface only, and its length integrates to one across it. Tension is a stress along the
@@ -138,4 +138,4 @@ struct SurfaceTension {
   std::vector<Scalar> velocity_{};  ///< velocity, mass
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

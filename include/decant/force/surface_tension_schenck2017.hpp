@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS), after Mueller et al. 2003, section
 /// 3.3: the colour field c = sum_j V_j W_ij is one in the liquid and zero outside, its gradient n points into the
@@ -91,4 +91,4 @@ struct SurfaceTensionSchenck2017 {
   std::vector<Scalar> volume_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -15,7 +15,7 @@
 #include <decant/core/types.hpp>
 #include <decant/force/detail/viscous_pair.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Newtonian viscosity between pairs, in the form of Cleary and Monaghan 1999 (see Monaghan 2005, "Smoothed particle
 /// hydrodynamics", Rep. Prog. Phys. 68, section 5) with D = 3 dimensions,
@@ -109,4 +109,4 @@ struct Viscosity {
   std::vector<Scalar> velocity_{};  ///< records of four, the last one unused
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

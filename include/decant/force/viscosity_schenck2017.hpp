@@ -13,7 +13,7 @@
 #include <decant/core/types.hpp>
 #include <decant/kernel/mueller_viscosity.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS): velocities enter as the sum
 /// v_i / rho_i^2 + v_j / rho_j^2 where friction needs their difference. With the Laplacian of Mueller's viscosity
@@ -85,4 +85,4 @@ struct ViscositySchenck2017 {
   std::vector<Scalar> records_{};  ///< v / rho^2, mass
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

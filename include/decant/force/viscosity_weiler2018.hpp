@@ -16,7 +16,7 @@
 #include <decant/core/types.hpp>
 #include <decant/force/detail/viscous_pair.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// After Weiler, Koschier, Brand and Bender 2018, "A physically consistent implicit viscosity solver for SPH fluids"
 /// (Computer Graphics Forum 37): the pair friction of Viscosity, evaluated at the velocities that it leads to,
@@ -210,4 +210,4 @@ struct ViscosityWeiler2018 {
   Reduction<double> reduction_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -33,7 +33,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/recording_writer.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A BOP scene, and what BOP does not say about it.
 struct BopScene {
@@ -231,4 +231,4 @@ inline void write_bop(const Recording& recording, const std::filesystem::path& f
   detail::write_text_file(scene / "scene_gt.json", detail::scene_gt_text(images));
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -21,7 +21,7 @@
 #include <decant/core/types.hpp>
 #include <decant/io/png.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// From where a picture is taken: a perspective view without distortion.
 struct PictureView {
@@ -403,4 +403,4 @@ class LiquidPainter {
   Picture picture_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -27,7 +27,7 @@
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Formats of mesh files.
 enum class MeshFormat {
@@ -608,4 +608,4 @@ inline void write_mesh(const std::filesystem::path& path, const TriangleMesh& me
   detail::write_text_file(path, bytes);
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A motion from text, in one of two forms:
 /// - header `t_s,x_m,y_m,z_m,qw,qx,qy,qz`, then one row per pose, separated by commas;
@@ -84,4 +84,4 @@ inline PoseTrack read_motion(const std::filesystem::path& path) {
   return parse_motion(detail::read_text_file(path, std::uintmax_t{1} << 28), path.string());
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

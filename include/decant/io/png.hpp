@@ -25,7 +25,7 @@
 #include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Pixels row by row from the top left, three bytes (red, green, blue) each.
 struct Picture {
@@ -354,4 +354,4 @@ inline void write_png(const std::filesystem::path& path, const ConstImageView<st
   detail::write_text_file(path, png_bytes(image));
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Shows how far a run from 0 to `total` has come, at most ten times a second. Silent where the stream is not a
 /// terminal.
@@ -92,4 +92,4 @@ class Progress {
   std::size_t written_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

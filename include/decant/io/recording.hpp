@@ -28,7 +28,7 @@
 #include <decant/io/png.hpp>
 #include <decant/simulation/inlet.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a recording is made of.
 namespace recording {
@@ -220,4 +220,4 @@ struct Recording {
   }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -33,7 +33,7 @@
 #include <decant/io/recording.hpp>
 #include <decant/io/series_file.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace detail {
 
@@ -488,4 +488,4 @@ inline Recording detail::RecordingFolder::read() const {
 /// std::runtime_error, one line that names the file, the key or the frame, and what was expected.
 inline Recording read_recording(const std::filesystem::path& folder) { return detail::RecordingFolder(folder).read(); }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/io/detail/json.hpp>
 #include <decant/io/recording_reader.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The text of the JSON value `truth` in a folder's recording.json, or nothing where there is none. For scoring alone:
 /// no estimator may call this. Throws std::runtime_error where recording.json cannot be read or is none.
@@ -27,4 +27,4 @@ inline std::optional<std::string> read_truth(const std::filesystem::path& folder
   return truth == document.end() ? std::nullopt : std::optional<std::string>(truth->dump());
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -30,7 +30,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/series_file.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace recording {
 
@@ -409,4 +409,4 @@ inline void write_recording(const std::filesystem::path& folder, const Recording
   writer.finish();
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -21,7 +21,7 @@
 #include <decant/io/png.hpp>
 #include <decant/io/table.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Lines over a common axis.
 struct LineChart {
@@ -572,4 +572,4 @@ follow_address();
   std::string script_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

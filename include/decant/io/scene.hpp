@@ -21,7 +21,7 @@
 #include <decant/io/detail/text.hpp>
 #include <decant/io/motion_file.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a scene is made of.
 namespace scene {
@@ -569,4 +569,4 @@ inline Scene read_scene(const std::filesystem::path& path) {
   return parse_scene(detail::read_text_file(path, std::uintmax_t{1} << 24), path.parent_path(), path.string());
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

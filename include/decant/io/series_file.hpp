@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Named columns of equal length; a missing value is NaN. The first column is the time `t_s` [s].
 struct Series {
@@ -172,4 +172,4 @@ inline void write_series(const std::filesystem::path& path, const Series& series
   detail::write_text_file(path, series_text(series));
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -11,7 +11,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Rows of cells under a header; the first column is flush left, the others flush right.
 class Table {
@@ -65,4 +65,4 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -22,7 +22,7 @@
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 namespace detail {
 
@@ -208,4 +208,4 @@ class VtkSequence {
   std::size_t times_liquid_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -7,7 +7,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A radial kernel in three dimensions, W(r, h) with the smoothing length h. A plain value without state.
 /// support_factor [-] > 0: W vanishes from the support radius, support_factor * h, on.
@@ -26,4 +26,4 @@ concept SmoothingKernel = requires(typename K::Scalar r, typename K::Scalar h) {
   { K::derivative_over_radius(r, h) } noexcept -> std::same_as<typename K::Scalar>;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Cubic B-spline in three dimensions (Monaghan 1992, section 7), support 2 h. With q = r/h,
 /// W = [(2 - q)+^3 - 4 (1 - q)+^3] / (4 pi h^3), where x+ = max(x, 0): the usual two pieces without a branch.
@@ -52,4 +52,4 @@ struct CubicSpline {
 static_assert(SmoothingKernel<CubicSpline<float>>);
 static_assert(SmoothingKernel<CubicSpline<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Mueller, Charypar & Gross 2003, eq. 22. The paper's h is the support radius; here it is H = 2 h, so that kernels can
 /// be exchanged at the same smoothing length. With s = r/H the paper's polynomial factorises to
@@ -67,4 +67,4 @@ struct MuellerViscosity {
 static_assert(SmoothingKernel<MuellerViscosity<float>>);
 static_assert(SmoothingKernel<MuellerViscosity<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Poly6 (Mueller, Charypar & Gross 2003, eq. 20): W = 315 / (64 pi H^9) (H^2 - r^2)^3. The paper's h is the support
 /// radius; here it is H = 2 h, so that kernels can be exchanged at the same smoothing length. Its gradient vanishes at
@@ -57,4 +57,4 @@ struct Poly6 {
 static_assert(SmoothingKernel<Poly6<float>>);
 static_assert(SmoothingKernel<Poly6<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Spiky (Mueller, Charypar & Gross 2003, eq. 21): W = 15 / (pi H^6) (H - r)^3, dW/dr = -45 / (pi H^6) (H - r)^2. The
 /// paper's h is the support radius; here it is H = 2 h, so that kernels can be exchanged at the same smoothing length.
@@ -47,4 +47,4 @@ struct Spiky {
 static_assert(SmoothingKernel<Spiky<float>>);
 static_assert(SmoothingKernel<Spiky<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Wendland C2 in three dimensions (Wendland 1995; scaled as in Dehnen & Aly 2012, table 1), support 2 h. With q = r/h,
 /// W = 21 / (16 pi h^3) (1 - q/2)^4 (2 q + 1), dW/dq = -105 / (16 pi h^3) q (1 - q/2)^3.
@@ -43,4 +43,4 @@ struct WendlandC2 {
 static_assert(SmoothingKernel<WendlandC2<float>>);
 static_assert(SmoothingKernel<WendlandC2<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/target.hpp>
 #include <decant/kernel/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Wendland C4 in three dimensions (Wendland 1995; scaled as in Dehnen & Aly 2012, table 1), support 2 h. With q = r/h,
 /// W = 495 / (256 pi h^3) (1 - q/2)^6 (35/12 q^2 + 3 q + 1), dW/dq = -1155 / (256 pi h^3) q (1 - q/2)^5 (5 q + 2).
@@ -44,4 +44,4 @@ struct WendlandC4 {
 static_assert(SmoothingKernel<WendlandC4<float>>);
 static_assert(SmoothingKernel<WendlandC4<double>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

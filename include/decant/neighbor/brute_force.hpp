@@ -8,7 +8,7 @@
 #include <decant/core/target.hpp>
 #include <decant/neighbor/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Compares each particle with all others, in ascending order: N operations per particle.
 template <std::floating_point ScalarType, class DomainType = OpenDomain>
@@ -48,4 +48,4 @@ class BruteForce {
 
 static_assert(NeighborSearch<BruteForce<float>> && NeighborSearch<BruteForce<double, PeriodicDomain<double>>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/detail/scratch.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A grid over the particles' bounding box, cells a little larger than the support radius, particles sorted by cell
 /// with x running fastest: three cells side by side are one contiguous run, and a particle's neighbours lie in nine
@@ -491,4 +491,4 @@ class CellGrid {
 
 static_assert(NeighborSearch<CellGrid<float>> && NeighborSearch<CellGrid<double, PeriodicDomain<double>>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

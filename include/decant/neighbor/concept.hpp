@@ -11,7 +11,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Finds the particles near a particle. A plain value; it keeps what it needs of the positions, so the caller's array
 /// may change or vanish after rebuild.
@@ -57,4 +57,4 @@ void check_search(const Domain& domain, Index count, Scalar support_radius) {
 
 }  // namespace detail
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

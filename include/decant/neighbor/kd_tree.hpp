@@ -18,7 +18,7 @@
 #include <decant/core/target.hpp>
 #include <decant/neighbor/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A balanced tree over the particles, for clouds whose density varies over orders of magnitude; for liquids CellGrid
 /// is about ten times faster. Each rebuild allocates and runs on one thread. Copies share the tree, which never
@@ -177,4 +177,4 @@ class KdTree {
 
 static_assert(NeighborSearch<KdTree<float>> && NeighborSearch<KdTree<double, PeriodicDomain<double>>>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

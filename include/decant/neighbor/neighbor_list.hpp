@@ -21,7 +21,7 @@
 #include <decant/neighbor/concept.hpp>
 #include <decant/neighbor/detail/scratch.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// One row per particle, neighbours in ascending order, filled up to whole batches with the particle's own index: there
 /// x_i - x_j is zero, so antisymmetric pair terms vanish and others are masked. Separations are written down beside the
@@ -465,4 +465,4 @@ class NeighborList {
   std::vector<std::size_t> needed_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -18,7 +18,7 @@
 #include <decant/core/types.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A sweep over neighbours carries information by one support radius, so that a deep column takes as many sweeps as it
 /// has layers. This finds in one go the best pressure that is linear between the nodes of a grid, four support radii
@@ -533,4 +533,4 @@ class CoarseGrid {
   std::vector<double> matrix_{}, value_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/pressure/coarse_grid.hpp>
 #include <decant/pressure/pressure_system.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// How a solve went.
 struct ComplementarityReport {
@@ -308,4 +308,4 @@ class ComplementaritySolver {
   Reduction<double> reduction_of_sums_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a solve took and reached.
 struct PressureReport {
@@ -51,4 +51,4 @@ concept PressureSolver =
       { P::search_margin } -> std::convertible_to<double>;
     };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

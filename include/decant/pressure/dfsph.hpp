@@ -18,7 +18,7 @@
 #include <decant/pressure/pressure_system.hpp>
 #include <decant/pressure/stable_step.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// After Bender and Koschier 2017, "Divergence-free SPH for incompressible and viscous fluids" (IEEE TVCG 23), with its
 /// two constraints, on the velocity's divergence and on the density. Each is a linear complementarity problem: pressure
@@ -247,4 +247,4 @@ class Dfsph {
   Reduction<Flag> flags_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

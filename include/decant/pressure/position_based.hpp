@@ -18,7 +18,7 @@
 #include <decant/pressure/concept.hpp>
 #include <decant/pressure/stable_step.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// After Macklin and Mueller 2013, "Position based fluids" (ACM TOG 32). With the constraint C_i = rho_i / rho_0 - 1 <=
 /// 0 of every particle at its predicted position x* = x + dt v, each sweep computes (eqs. 8, 9, 11, 12)
@@ -282,4 +282,4 @@ class PositionBased {
   Reduction<Compression> reduction_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

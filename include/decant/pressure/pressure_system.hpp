@@ -12,7 +12,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Pairs' kernel gradients are computed once per sub-step and reused by every sweep. They are kept as Compact numbers,
 /// since sweeps wait for them: each may be off by one part in 4,000, which is as if particles were off by a thousandth
@@ -237,4 +237,4 @@ class PressureSystem {
   std::vector<Scalar> records_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

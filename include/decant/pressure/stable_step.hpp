@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Pressure holds particles in place against modes that the density does not see (every other one up, every other one
 /// down) with the stiffness p / (rho d^2), and a sub-step integrates that explicitly, whatever solver finds the
@@ -40,4 +40,4 @@ typename Step::Scalar largest_stable_step(const Step& step, double mean_pressure
                              std::sqrt(2 * mean_pressure));
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

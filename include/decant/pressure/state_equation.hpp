@@ -18,7 +18,7 @@
 #include <decant/force/detail/pair_stiffness.hpp>
 #include <decant/pressure/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Tait's equation p = B ((rho / rho_0)^gamma - 1) (Monaghan 1994, "Simulating free surface flows with SPH", eq. 2.3;
 /// its sound speed is c^2 = gamma B / rho_0), with the symmetric, momentum-conserving pressure force of Monaghan 1992
@@ -176,4 +176,4 @@ class StateEquation {
   Reduction<double> reduction_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

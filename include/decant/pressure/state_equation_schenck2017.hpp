@@ -15,7 +15,7 @@
 #include <decant/core/types.hpp>
 #include <decant/pressure/concept.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Schenck and Fox 2017, "Reasoning About Liquids via Closed-Loop Simulation" (RSS), section on the simulator: the
 /// linear equation of state p = c^2 (rho - rho_0) and, with the acceleration f / rho, the force density
@@ -96,4 +96,4 @@ class StateEquationSchenck2017 {
   std::vector<Scalar> records_{};  ///< p / rho^2, volume, two unused
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

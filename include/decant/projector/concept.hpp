@@ -15,7 +15,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Draws particles as a camera sees them. A plain value; one of them serves one caller at a time.
 /// render(position, hidden, camera, camera_from_world, coverage, threads): position is 3xN [m], world frame. hidden is
@@ -36,4 +36,4 @@ concept Projector = CameraModel<Camera> && std::copyable<P> && std::floating_poi
   noexcept->std::same_as<PixelBox>;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

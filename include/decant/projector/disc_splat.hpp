@@ -15,7 +15,7 @@
 #include <decant/projector/concept.hpp>
 #include <decant/projector/detail/splatter.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Draws each particle as a disc around its projected centre. The disc is as large as the sphere of the given radius at
 /// the particle's depth: radius * sqrt(fx fy) / z for a pinhole, radius * sqrt|det d(u, v)/d(x, y)| for any camera.
@@ -88,4 +88,4 @@ class DiscSplat {
 };
 static_assert(Projector<DiscSplat<float>, PinholeCamera> && Projector<DiscSplat<double>, PinholeCamera>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Morphological closing of a mask with a disc: grows the liquid by a radius and shrinks it back. Gaps and holes that
 /// the disc does not fit into are filled, everything else keeps its outline, and no liquid is lost. Pixels beyond the
@@ -146,4 +146,4 @@ class GapClosing {
   std::vector<Word> original_, grown_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -20,7 +20,7 @@
 #include <decant/projector/concept.hpp>
 #include <decant/projector/detail/splatter.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Draws each particle as the exact outline of its sphere: a pixel counts if the ray through its centre meets the
 /// sphere before the camera. With the ray o + t d and c the sphere's centre as seen from o, that is |d x c|^2 <= |d|^2
@@ -197,4 +197,4 @@ class ProjectedSphere {
 };
 static_assert(Projector<ProjectedSphere<float>, PinholeCamera> && Projector<ProjectedSphere<double>, PinholeCamera>);
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

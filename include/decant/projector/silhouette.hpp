@@ -19,7 +19,7 @@
 #include <decant/projector/disc_splat.hpp>
 #include <decant/projector/gap_closing.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Writes mask_liquid where coverage is above zero, and 0 elsewhere. `drawn` is what Projector::render returned, or
 /// PixelBox::of(coverage). Both images are of one size.
@@ -95,4 +95,4 @@ class Silhouette {
   PixelBox drawn_{};  ///< outside of it coverage_ is zero
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/types.hpp>
 #include <decant/simulation/simulator.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The space of one container, ready for many questions. Which liquid is in it is asked in the container's own frame:
 /// what is above the rim's plane is not, however the container is tilted.
@@ -60,4 +60,4 @@ class Contents {
   std::shared_ptr<const Cavity> cavity_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

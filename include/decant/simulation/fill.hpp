@@ -20,7 +20,7 @@
 #include <decant/core/types.hpp>
 #include <decant/simulation/simulator.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// How much.
 struct FillAmount {
@@ -212,4 +212,4 @@ FillReport fill(Simulator<Parts>& simulator, BodyId body, const FillAmount& amou
   return report;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

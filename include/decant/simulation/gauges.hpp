@@ -24,7 +24,7 @@
 #include <decant/core/types.hpp>
 #include <decant/neighbor/cell_grid.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Takes readings of particles at one instant: observe() first, then any number of readings. SI units, world frame, up
 /// is +z. Particles with non-finite coordinates are passed over.
@@ -380,4 +380,4 @@ class Gauges {
   CellGrid<double> flat_grid_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

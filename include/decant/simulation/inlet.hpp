@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What an inlet is asked to do.
 struct InletSettings {
@@ -100,4 +100,4 @@ class Inlet {
   std::vector<Vector3<double>> layer_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -9,7 +9,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Bulk properties of a Newtonian liquid against air.
 struct Liquid {
@@ -55,4 +55,4 @@ inline constexpr Liquid milk{1030.0, 2.1e-3, 0.0524};
 
 }  // namespace liquids
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -23,7 +23,7 @@
 #include <decant/pressure/state_equation.hpp>
 #include <decant/pressure/state_equation_schenck2017.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Incompressible liquid with standard, momentum-conserving forces. `float` holds micrometres over metres and is twice
 /// as fast; take `double` for analysis. Surface tension is left out: at spacings above a millimetre or two, water's
@@ -79,4 +79,4 @@ struct Schenck2017Parts : DefaultParts<ScalarType> {
   using PressureSolver = StateEquationSchenck2017<ScalarType>;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -38,7 +38,7 @@
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A liquid simulation composed of Parts (see simulation/parts.hpp). Holds no global state: any number of differently
 /// composed simulators can live side by side. Not safe to call from several threads at once; copies are independent.
@@ -753,4 +753,4 @@ class Simulator {
 /// The ready-made simulator.
 using LiquidSimulator = Simulator<DefaultParts<>>;
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

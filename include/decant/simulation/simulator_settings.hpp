@@ -11,7 +11,7 @@
 #include <decant/core/types.hpp>
 #include <decant/simulation/liquid.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What every simulator needs to know, whatever its parts.
 struct SimulatorSettings {
@@ -70,4 +70,4 @@ inline void validate(const SimulatorSettings& settings) {
           settings.threads.count);
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

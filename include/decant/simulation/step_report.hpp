@@ -11,7 +11,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 enum class StepStatus {
   Ok,
@@ -107,4 +107,4 @@ struct StepReport {
   bool advanced() const { return status == StepStatus::Ok || status == StepStatus::NotConverged; }
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

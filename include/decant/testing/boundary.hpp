@@ -16,7 +16,7 @@
 #include <decant/core/types.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// Tries the laws of a boundary around places of liquid.
 /// @param bodies with all bodies added; they are held where they are at time 0. Copied.
@@ -135,4 +135,4 @@ std::vector<Law> boundary_laws(Bodies bodies, const PointArray<typename Bodies::
   };
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

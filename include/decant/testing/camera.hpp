@@ -19,7 +19,7 @@
 #include <decant/core/types.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 namespace detail {
 
@@ -219,4 +219,4 @@ std::vector<Law> occlusion_laws(const OcclusionType& occlusion, const PosedCamer
   };
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

@@ -10,7 +10,7 @@
 #include <decant/correction/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// Tries the laws of a corrector on copies of it and of a liquid, each with one call.
 /// @param nothing an observation of nothing (no camera had a mask). @param perfect one that is just what the liquid
@@ -50,4 +50,4 @@ std::vector<Law> corrector_laws(const CorrectorType& corrector,
   };
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

@@ -21,7 +21,7 @@
 #include <decant/neighbor/neighbor_list.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// Liquid by itself with all that a StepView refers to, for trying forces and pressure solvers without a simulator.
 template <class KernelType>
@@ -210,4 +210,4 @@ std::vector<Law> force_laws(Force force, Keeps keeps) {
   return laws;
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

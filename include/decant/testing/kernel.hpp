@@ -14,7 +14,7 @@
 #include <decant/kernel/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// Tries the laws of a kernel at one smoothing length [m]; run it at several, since a wrong power of h hides at h = 1.
 /// Takes about a millisecond.
@@ -93,4 +93,4 @@ std::vector<Law> kernel_laws(typename Kernel::Scalar smoothing_length) {
   };
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

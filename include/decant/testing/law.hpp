@@ -9,7 +9,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// A law holds if `error` is at most `bound`; NaN does not hold.
 struct Law {
@@ -27,4 +27,4 @@ struct Law {
   }
 };
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

@@ -18,7 +18,7 @@
 #include <decant/neighbor/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// A cloud of particles that searches find hard, in units of a support radius of 1.
 template <class Scalar>
@@ -192,4 +192,4 @@ std::vector<Law> neighbor_laws(Search search) {
   return laws;
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

@@ -21,7 +21,7 @@
 #include <decant/projector/concept.hpp>
 #include <decant/testing/law.hpp>
 
-namespace decant::DECANT_TARGET::testing {
+namespace decant::inline DECANT_TARGET::testing {
 
 /// Tries the laws of a projector that draws one particle as something that covers at least one pixel when it fills
 /// some: spheres of millimetres, seen by a pinhole camera from 30 to 70 cm. Takes some milliseconds.
@@ -118,4 +118,4 @@ requires Projector<P, PinholeCamera> std::vector<Law> projector_laws(const P& co
   };
 }
 
-}  // namespace decant::DECANT_TARGET::testing
+}  // namespace decant::inline DECANT_TARGET::testing

@@ -22,7 +22,7 @@
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Something of a model that is not known exactly. What is expected is zero, give or take a deviation.
 template <class Model>
@@ -347,4 +347,4 @@ class FixedLagTracker {
   int since_adapted_ = 0;  ///< frames
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

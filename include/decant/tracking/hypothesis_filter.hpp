@@ -18,7 +18,7 @@
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Settings of HypothesisFilter.
 struct HypothesisFilterSettings {
@@ -182,4 +182,4 @@ class HypothesisFilter {
   std::vector<Hypothesis> hypotheses_{};
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/tracking/overlap.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// The paper's probability that a pixel is as predicted (Schenck & Fox 2017), so close to 1/2 because of underflow: the
 /// odds of two predictions, a power of delta / (1 - delta), then stay below e^13 for all 307,200 pixels of an image.
@@ -113,4 +113,4 @@ inline std::optional<ImageLikelihoodSettings> calibrate_image_likelihood(std::sp
                                  .pixels_per_error = std::max(1.0, chi_squared / static_cast<double>(frames - 1))};
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// A simulation of liquid among rigid bodies, decant's own or somebody else's. A simulation that keeps its particles in
 /// arrays of its own copies them into a FluidState after each step and back at the start of the next.
@@ -37,4 +37,4 @@ concept LiquidModel = requires(M& model, const M& asked, BodyId body, const Pose
   { model.step(duration).advanced() } -> std::same_as<bool>;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -10,7 +10,7 @@
 #include <decant/core/types.hpp>
 #include <decant/coverage/detail/liquid_box.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Liquid comes into sight and leaves it by and by, a segmentation fails from one frame to the next. So a mask with
 /// little liquid is believed where the last one that was believed showed little, too; at the start that is none.
@@ -36,4 +36,4 @@ class MaskTrust {
   Index last_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Pixel counts of a predicted and an observed mask of one size.
 struct Overlap {
@@ -102,4 +102,4 @@ inline Overlap overlap(const ConstMaskView& predicted, const ConstMaskView& obse
   });
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

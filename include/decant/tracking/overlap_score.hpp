@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/tracking/overlap.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 struct OverlapScoreSettings {
   /// Frames whose union is smaller are left out of the mean over frames, >= 1. A jet's first drops cover some ten
@@ -112,4 +112,4 @@ class RecordingsScore {
   std::int64_t recordings_left_out_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

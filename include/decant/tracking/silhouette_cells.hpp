@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Compares silhouettes cell by cell. Pixels are not independent: where a jet is off, so are hundreds of them. In
 /// cells that are as large as such errors, what is left of dependence is little.
@@ -50,4 +50,4 @@ class SilhouetteCells {
   int cell_px_;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -32,7 +32,7 @@
 #include <decant/tracking/mask_trust.hpp>
 #include <decant/tracking/overlap.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What a tracker needs to know beside its model and its corrector.
 struct TrackerSettings {
@@ -449,4 +449,4 @@ class Tracker {
   bool started_ = false;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -12,7 +12,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// What is known of a quantity, in its unit.
 struct ValueEstimate {
@@ -91,4 +91,4 @@ inline ValueEstimate estimate_value(std::span<const double> values, std::span<co
   return estimate;
 }
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

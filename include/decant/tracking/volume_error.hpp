@@ -9,7 +9,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET {
+namespace decant::inline DECANT_TARGET {
 
 /// Estimated against true volumes, over frames or over recordings. Amounts come in m^3, errors go out in millilitres,
 /// in which one pours. All are NaN as long as nothing was compared.
@@ -60,4 +60,4 @@ class VolumeError {
   double last_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET
+}  // namespace decant::inline DECANT_TARGET

@@ -17,7 +17,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// One side of one triangle.
 struct MeshEdge {
@@ -251,4 +251,4 @@ inline double span_width(const std::vector<Vector3<double>>& vertices, const std
   return 2 * std::sqrt(largest);
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

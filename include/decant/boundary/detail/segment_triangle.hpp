@@ -14,7 +14,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// A triangle of a surface, as a BoundingVolumeHierarchy keeps it.
 struct TreeTriangle {
@@ -203,4 +203,4 @@ inline TriangleCrossing cross(const TreeTriangle& triangle, const Vector3<double
   return crossing;
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -12,7 +12,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 inline Eigen::Isometry3d isometry_of(const Pose& pose) noexcept {
   Eigen::Isometry3d result = Eigen::Isometry3d::Identity();
@@ -43,4 +43,4 @@ inline std::optional<double> first_depth(const BoundingVolumeHierarchy& surface,
   return hit ? std::optional<double>(hit->fraction * limit) : std::nullopt;
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

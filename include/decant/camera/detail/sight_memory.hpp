@@ -22,7 +22,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// Two shortcuts that change no answer, for sight lines that begin at the origin of the camera's frame. One that ends
 /// before all that any body has in its part of the image meets nothing. And what is behind a wall is mostly in the
@@ -295,4 +295,4 @@ class SightMemory {
   Image<Hints> hints_;
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -19,7 +19,7 @@
 #include <decant/core/types.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// The four cubic B-splines that reach a place a fraction t of the way from one node to the next. They add up to 1, and
 /// none is negative.
@@ -306,4 +306,4 @@ class KernelGrid {
   std::array<std::vector<float>, channels> sums_;
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

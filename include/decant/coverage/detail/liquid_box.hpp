@@ -10,7 +10,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// Pixels of a mask that are liquid, within a box that lies on the mask.
 inline Index count_liquid(const ConstMaskView& mask, const PixelBox& box) noexcept {
@@ -54,4 +54,4 @@ inline PixelBox liquid_box(const ConstMaskView& mask) noexcept {
   return box;
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

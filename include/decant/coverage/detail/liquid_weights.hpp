@@ -15,7 +15,7 @@
 #include <decant/core/types.hpp>
 #include <decant/coverage/image_kernel.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// 1 / (coverage + 1) where the mask is liquid, 0 elsewhere. Coverage that is negative or NaN counts as none.
 inline float liquid_weight(std::uint8_t mask, float coverage) noexcept {
@@ -77,4 +77,4 @@ void for_each_liquid(const ConstMaskView& mask, const ConstImageView<float>& cov
   }
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// Marks squares of eight pixels in which a pixel is liquid in one mask and not in the other.
 class MaskDisagreement {
@@ -66,4 +66,4 @@ class MaskDisagreement {
   Image<std::uint8_t> differs_{};
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -7,7 +7,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// sum_j V_j |W'(r_j)| / r_j over a cubic lattice of the given spacing [1/m^2]. A few hundred kernel evaluations.
 template <class Kernel>
@@ -30,4 +30,4 @@ typename Kernel::Scalar pair_stiffness(typename Kernel::Scalar smoothing_length,
   return total * spacing * spacing * spacing;
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -10,7 +10,7 @@
 #include <decant/core/batch.hpp>
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// 2 (D + 2) (-W'/r) / r^2 with D = 3 and a kernel of its own whose slope is that of a hat,
 /// -W' / r = 45 / (2 pi R^5) (1 - r / R). See Viscosity for why.
@@ -51,4 +51,4 @@ class ViscousPair {
   Scalar support_, per_support_, least_squared_, strength_;
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

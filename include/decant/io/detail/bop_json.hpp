@@ -29,7 +29,7 @@
 #include <decant/io/detail/text.hpp>
 #include <decant/io/recording.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 inline constexpr std::size_t image_limit = 1000000;  // what six digits can name
 inline constexpr std::int64_t object_id_limit = 999999;
@@ -238,4 +238,4 @@ inline void write_model(const std::filesystem::path& path, const TriangleMesh& m
   write_text_file(path, text);
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -13,7 +13,7 @@
 #include <decant/core/target.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// Where `relative` leads inside `folder`, links resolved; nothing where there is no such entry. Throws
 /// std::runtime_error where it leads out of the folder or nowhere.
@@ -60,4 +60,4 @@ inline std::string six_digits(std::size_t number) {
   return digits.size() < 6 ? std::string(6 - digits.size(), '0') + digits : digits;
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

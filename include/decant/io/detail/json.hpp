@@ -24,7 +24,7 @@
 #include <decant/core/types.hpp>
 #include <decant/io/detail/text.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// A value inside a document with its path, as messages name it. Does not own the document.
 class JsonNode {
@@ -212,4 +212,4 @@ inline nlohmann::json parse_json(std::string_view text, const std::string& file,
   }
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

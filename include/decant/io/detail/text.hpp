@@ -19,7 +19,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// At most `limit` bytes of text, with control characters and quotes made visible: safe inside a one-line message.
 inline std::string visible_text(std::string_view text, std::size_t limit = 60) {
@@ -144,4 +144,4 @@ inline std::string fixed_text(double value, int digits) {
   return error == std::errc() ? std::string(buffer, end) : std::string("nan");
 }
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -13,7 +13,7 @@
 
 #include <decant/core/target.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// An array that starts at a cache line and whose contents are lost when it grows.
 template <class Value>
@@ -67,4 +67,4 @@ class Scratch {
   std::size_t capacity_ = 0;
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail

@@ -19,7 +19,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
-namespace decant::DECANT_TARGET::detail {
+namespace decant::inline DECANT_TARGET::detail {
 
 /// A pixel number as int, within [lowest, highest]; NaN gives the lowest.
 inline int pixel_between(double pixel, int lowest, int highest) noexcept {
@@ -111,4 +111,4 @@ class Splatter {
   std::vector<Footprint> footprints_;
 };
 
-}  // namespace decant::DECANT_TARGET::detail
+}  // namespace decant::inline DECANT_TARGET::detail
