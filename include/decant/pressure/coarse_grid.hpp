@@ -45,6 +45,7 @@ class CoarseGrid {
       coarsen(step);
     }
     gather_members(step);
+    make_room();
   }
 
   std::size_t nodes() const noexcept { return node_keys_.size(); }
@@ -86,7 +87,7 @@ class CoarseGrid {
     for_each_cell(step.threads, [&](const Cell& cell) {
       products_[number_of(cell)] = products_of(cell, step.neighbors, system, contact);
     });
-    lay_out_profile();
+    matrix_.assign(nodes() == 0 ? 0 : row_.back() + nodes(), 0.0);
     for (const Cell& cell : cells_) {
       const Products& products = products_[number_of(cell)];
       for (std::size_t k = 0; k < corners; ++k) {
@@ -445,6 +446,30 @@ class CoarseGrid {
     cell_sums_.resize(cells_.size());
   }
 
+  /// Frames must not allocate just because the grid is called for the first time, or liquid has spread a little.
+  void make_room() {
+    const auto room = [](auto& values, std::size_t size) {
+      if (values.capacity() < size) {
+        values.reserve(2 * size);
+      }
+    };
+    room(cells_, cells_.size() + 1);
+    room(cell_sums_, cells_.size() + 1);
+    room(products_, cells_.size() + 1);
+    lay_out_profile();
+    room(matrix_, row_.empty() ? 0 : row_.back() + nodes());
+    for (auto* values : {&first_, &rank_}) {
+      room(*values, nodes() + 1);
+    }
+    room(node_keys_, nodes() + 1);
+    room(row_, nodes() + 1);
+    room(value_, nodes() + 1);
+    room(member_, member_.size() + 1);
+    for (auto& along : along_) {
+      room(along, member_.size() + 1);
+    }
+  }
+
   // ---- the matrix -------------------------------------------------------------------------------------------------
 
   /// The lower triangle, each row from its first entry that is not zero.
@@ -467,7 +492,6 @@ class CoarseGrid {
       row_[n] = entries - first_[n];  // never negative: each row before has an entry
       entries += n - first_[n] + 1;
     }
-    matrix_.assign(entries, 0.0);
   }
 
   /// Rows are short, and one sum after the other would wait for each addition.

@@ -41,7 +41,7 @@ class Dfsph {
   static constexpr bool uses_gradient_correction = true;
 
   Scalar density_tolerance = Scalar(1e-3);     ///< mean compression of the next positions over rest density [-], > 0
-  Scalar divergence_tolerance = Scalar(1e-4);  ///< mean compression per sub-step of the velocities [-], > 0
+  Scalar divergence_tolerance = Scalar(5e-5);  ///< mean compression per sub-step of the velocities [-], > 0
   Scalar largest_tolerance = Scalar(1e-2);     ///< of either, for any single particle [-], > 0
   int most_iterations = 200;                   ///< of each solve, per sub-step
   Scalar tolerance_factor = Scalar(1);         ///< of what single particles may be amiss by [-], > 0
