@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -92,13 +93,7 @@ std::unique_ptr<Contestant> contestant(std::string name, const Film& film, const
   return result;
 }
 
-double sum_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) {
-    sum += value;
-  }
-  return sum;
-}
+double sum_of(const std::vector<double>& values) { return std::accumulate(values.begin(), values.end(), 0.0); }
 
 void report_contestant(Report& report, const Contestant& of, const Contestant& reference, int threads) {
   const std::string title = "corrector " + of.name;

@@ -73,10 +73,20 @@ SimulatorSettings settings_for(int threads, double fixed_step) {
   return settings;
 }
 
-/// The empty box: frictionless, closed. Tolerances are the library's own; they are at most 0.1 %.
+/// Of the pressure solver. Those of peers: means of at most 0.1 % each, whatever single particles do.
+enum class Tolerances { Own, Peers };
+
+/// The empty box: frictionless, closed.
 template <class Parts>
-Simulator<Parts> box(int per_edge, const SimulatorSettings& settings) {
+Simulator<Parts> box(int per_edge, const SimulatorSettings& settings, Tolerances tolerances) {
   Simulator<Parts> simulator(settings);
+  if constexpr (requires { simulator.pressure_solver().divergence_tolerance; }) {
+    if (tolerances == Tolerances::Peers) {
+      auto& solver = simulator.pressure_solver();
+      solver.density_tolerance = solver.divergence_tolerance = 1e-3F;
+      solver.largest_tolerance = 0.1F;
+    }
+  }
   if constexpr (requires { simulator.pressure_solver().stiffness; }) {
     simulator.pressure_solver().stiffness = 50000;  // [Pa]
     simulator.pressure_solver().exponent = 7;
@@ -291,7 +301,7 @@ void report_runs(Report& report, const std::string& title, long particles, doubl
 
 template <class Parts>
 void measure(const Options& options, Report& report, const std::string& solver, const Workload& workload,
-             double fixed_step) {
+             double fixed_step, Tolerances tolerances = Tolerances::Own) {
   const std::string title = workload.name + ", " + solver;
   if (!report.wants(title)) {
     return;
@@ -305,13 +315,13 @@ void measure(const Options& options, Report& report, const std::string& solver, 
   for (const int threads : options.numbers("threads")) {
     all.push_back({threads});
   }
-  const auto empty = box<Parts>(n, settings_for(1, fixed_step));
+  const auto empty = box<Parts>(n, settings_for(1, fixed_step), tolerances);
   const int repetitions = options.numbers("repetitions").front();
   for (int repetition = 0; repetition < repetitions; ++repetition) {
     for (Runs& of : all) {
       Snapshots snapshots;
       of.runs.push_back(in_child_process([&] {
-        auto simulator = box<Parts>(n, settings_for(of.threads, fixed_step));
+        auto simulator = box<Parts>(n, settings_for(of.threads, fixed_step), tolerances);
         fill(n, simulator);
         return simulate(std::move(simulator), duration, frame, snapshots);
       }));
@@ -333,14 +343,15 @@ int main(int argc, char** argv) {
   Options options("bench_whole_step", "whole sub-steps of a cube of water that collapses");
   options.add_threads()
       .add("workloads", "W1,W2,W3", "of W1, W2 and W3 (8,000, 64,000 and 512,000 particles), or particles per edge")
-      .add("solvers", "dfsph,pbf,wcsph", "of dfsph, pbf (up to W1 only) and wcsph")
+      .add("solvers", "dfsph,dfsph_peers,pbf,wcsph",
+           "of dfsph, dfsph_peers (its tolerances: means of 0.1 %), pbf (up to W1 only) and wcsph")
       .add("repetitions", "1", "runs of each kind")
       .add("quick", "no", "a tenth of the simulated times, for a first look");
   return benchmark_main(argc, argv, options, [](const Options& given, Report& report) {
     const std::vector<std::string> wanted = given.words("workloads"), solvers = given.words("solvers");
     for (const std::string& name : solvers) {
-      if (name != "dfsph" && name != "pbf" && name != "wcsph") {
-        throw std::invalid_argument("--solvers must be of dfsph, pbf and wcsph, got '" + name + "'");
+      if (name != "dfsph" && name != "dfsph_peers" && name != "pbf" && name != "wcsph") {
+        throw std::invalid_argument("--solvers must be of dfsph, dfsph_peers, pbf and wcsph, got '" + name + "'");
       }
     }
     for (const std::string& name : wanted) {
@@ -348,6 +359,8 @@ int main(int argc, char** argv) {
       for (const std::string& solver : solvers) {
         if (solver == "dfsph") {
           measure<decant::DefaultParts<>>(given, report, "Dfsph", workload, 0);
+        } else if (solver == "dfsph_peers") {
+          measure<decant::DefaultParts<>>(given, report, "Dfsph, tolerances of peers", workload, 0, Tolerances::Peers);
         } else if (solver == "wcsph") {
           measure<decant::StateEquationParts<>>(given, report, "StateEquation", workload, 2e-4);
         } else if (workload.per_edge <= 20) {

@@ -3,6 +3,7 @@
 
 #include <decant/simulation/simulator.hpp>
 
+#include <numeric>
 #include <vector>
 
 #include <decant/boundary/shapes.hpp>
@@ -49,13 +50,7 @@ std::vector<long> allocations_per_frame(int threads, int warm_up, int frames, in
   return counts;
 }
 
-long total(const std::vector<long>& counts) {
-  long sum = 0;
-  for (const long count : counts) {
-    sum += count;
-  }
-  return sum;
-}
+long total(const std::vector<long>& counts) { return std::accumulate(counts.begin(), counts.end(), 0L); }
 
 }  // namespace
 
