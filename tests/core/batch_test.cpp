@@ -131,6 +131,63 @@ TEMPLATE_TEST_CASE("Sum adds all lanes", "", float, double) {
   CHECK(decant::sum(TestType(5)) == 5);
 }
 
+namespace {
+
+/// sum_each() of `count` batches against sum() of each, with lanes whose sum depends on the order of additions.
+template <class Scalar, std::size_t count>
+void sums_are_those_of_each() {
+  using B = Batch<Scalar>;
+  std::array<B, count> of;
+  std::array<Scalar, B::width> lanes;
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) {
+      lanes[lane] =
+          std::sin(static_cast<Scalar>(31 * k + 7 * lane + 1)) * static_cast<Scalar>(1 << (5 * lane + k) % 17);
+    }
+    of[k] = B::load(lanes.data());
+  }
+  const std::array<Scalar, count> sums = decant::sum_each(of);
+  for (std::size_t k = 0; k < count; ++k) {
+    INFO(k << " of " << count);
+    CHECK(sums[k] == decant::sum(of[k]));
+  }
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("Sums of several batches have the bits of each batch's own", "", float, double) {
+  sums_are_those_of_each<TestType, 1>();
+  sums_are_those_of_each<TestType, 2>();
+  sums_are_those_of_each<TestType, 3>();
+  sums_are_those_of_each<TestType, 4>();
+  sums_are_those_of_each<TestType, 8>();
+  sums_are_those_of_each<TestType, 9>();
+  sums_are_those_of_each<TestType, 12>();
+}
+
+TEMPLATE_TEST_CASE("The largest lane is found wherever it is", "", float, double) {
+  using B = Batch<TestType>;
+  for (std::size_t largest = 0; largest < static_cast<std::size_t>(B::width); ++largest) {
+    std::array<TestType, B::width> lanes;
+    lanes.fill(TestType(-3));
+    lanes[largest] = TestType(-2);
+    CHECK(decant::largest_lane(B::load(lanes.data())) == TestType(-2));
+  }
+  CHECK(decant::largest_lane(TestType(-4)) == TestType(-4));
+}
+
+TEMPLATE_TEST_CASE("Numbers side by side are read and written as one or as a batch", "", float, double) {
+  using B = Batch<TestType>;
+  std::vector<TestType> from(B::width + 2), to(from.size(), TestType(0));
+  std::iota(from.begin(), from.end(), TestType(1));
+  decant::store_as(decant::load_as<B>(&from[1]), &to[1]);
+  CHECK(to[0] == 0);
+  CHECK(std::equal(from.begin() + 1, from.end() - 1, to.begin() + 1));
+  CHECK(to.back() == 0);
+  decant::store_as(decant::load_as<TestType>(&from.back()), &to.back());
+  CHECK(to.back() == from.back());
+}
+
 TEMPLATE_TEST_CASE("Gather reads what the indices name", "", float, double) {
   using B = Batch<TestType>;
   std::vector<TestType> records(4 * 50);

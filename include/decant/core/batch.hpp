@@ -383,6 +383,11 @@ template <std::floating_point Scalar>
 [[gnu::always_inline]] inline Scalar sum(Scalar a) noexcept {
   return a;
 }
+template <std::floating_point Scalar>
+[[gnu::always_inline]] inline Scalar largest_lane(Scalar a) noexcept {
+  return a;
+}
+[[gnu::always_inline]] inline bool any(bool a) noexcept { return a; }
 
 // The batches' own functions, under their qualified names too, and for a batch mixed with numbers.
 namespace detail {
@@ -423,6 +428,15 @@ template <class Scalar, int Width>
 template <class Scalar, int Width>
 [[gnu::always_inline]] inline Scalar sum(Batch<Scalar, Width> a) noexcept {
   return a.total();
+}
+/// The largest of all lanes, none of which is NaN.
+template <class Scalar, int Width>
+[[gnu::always_inline]] inline Scalar largest_lane(Batch<Scalar, Width> a) noexcept {
+  Scalar largest = a[0];
+  for (int lane = 1; lane < Width; ++lane) {
+    largest = a[lane] > largest ? a[lane] : largest;
+  }
+  return largest;
 }
 
 namespace detail {
@@ -478,6 +492,24 @@ template <class Scalar, int Width, std::size_t count>
     }
   }
   return sums;
+}
+
+/// Numbers that lie side by side, read as one number or as a batch of them.
+template <class Number, std::floating_point Scalar>
+[[gnu::always_inline]] inline Number load_as(const Scalar* from) noexcept {
+  if constexpr (std::is_same_v<Number, Scalar>) {
+    return *from;
+  } else {
+    return Number::load(from);
+  }
+}
+template <std::floating_point Scalar>
+[[gnu::always_inline]] inline void store_as(Scalar number, Scalar* to) noexcept {
+  *to = number;
+}
+template <class Scalar, int Width>
+[[gnu::always_inline]] inline void store_as(Batch<Scalar, Width> number, Scalar* to) noexcept {
+  number.store(to);
 }
 
 /// x^2 + y^2 + z^2, always rounded in the same way: whoever compares distances with a radius agrees with all others.

@@ -4,6 +4,7 @@
 /// What makes kernel gradients exact for velocities that vary linearly, whatever the arrangement of the particles.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -53,8 +54,10 @@ class GradientCorrection {
       });
       const Scalar volume = -1 / step.rest_density;
       const auto wall = step.walls.moment.col(i);
-      set(i, shortened_inverse({volume * sum(xx) + wall[0], volume * sum(xy) + wall[1], volume * sum(xz) + wall[2],
-                                volume * sum(yy) + wall[3], volume * sum(yz) + wall[4], volume * sum(zz) + wall[5]}));
+      const std::array<Scalar, 6> pairs = sum_each(std::array{xx, xy, xz, yy, yz, zz});
+      set(i,
+          shortened_inverse({volume * pairs[0] + wall[0], volume * pairs[1] + wall[1], volume * pairs[2] + wall[2],
+                             volume * pairs[3] + wall[3], volume * pairs[4] + wall[4], volume * pairs[5] + wall[5]}));
     });
   }
 

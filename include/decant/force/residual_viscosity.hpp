@@ -130,7 +130,7 @@ struct ResidualViscosity {
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
       });
-      const Vector3<Scalar> pull = factor * Vector3<Scalar>(sum(x), sum(y), sum(z));
+      const Vector3<Scalar> pull = factor * Vector3<Scalar>(sum_each(std::array{x, y, z}).data());
       acceleration.col(i) += pull;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         next_[own + axis] = velocity[axis] + step.time_step * pull[static_cast<Index>(axis)];
@@ -163,9 +163,11 @@ struct ResidualViscosity {
           rows[axis].z = multiply_add(weight, pair.z, rows[axis].z);
         }
       });
+      const std::array<Scalar, 9> pairs = sum_each(std::array{rows[0].x, rows[0].y, rows[0].z, rows[1].x, rows[1].y,
+                                                              rows[1].z, rows[2].x, rows[2].y, rows[2].z});
       std::array<Vector3<Scalar>, 3> sums;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        sums[axis] = Vector3<Scalar>(sum(rows[axis].x), sum(rows[axis].y), sum(rows[axis].z)) / step.rest_density;
+        sums[axis] = Vector3<Scalar>(&pairs[3 * axis]) / step.rest_density;
       }
       const WallContact<Scalar>* contacts = step.walls.contacts_of(i);
       for (int k = 0; k < step.walls.contact_count[i]; ++k) {

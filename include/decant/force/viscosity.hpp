@@ -70,7 +70,7 @@ struct Viscosity {
         y = multiply_add(push, pair.y, y);
         z = multiply_add(push, pair.z, z);
       });
-      acceleration.col(i) += factor * Vector3<Scalar>(sum(x), sum(y), sum(z));
+      acceleration.col(i) += factor * Vector3<Scalar>(sum_each(std::array{x, y, z}).data());
       add_wall_friction(step, i, acceleration);
     });
   }

@@ -53,26 +53,7 @@ class CoarseGrid {
   /// Takes r: Z^T r, over the particles with contact[i] == 1 (else 0). @return sum over nodes of what came out, without
   /// its sign.
   double restrict(const std::vector<Scalar>& residual, const std::vector<Scalar>& contact, Threads threads) noexcept {
-    for_each_cell(threads, [&](const Cell& cell) {
-      std::array<B, corners> sums;
-      sums.fill(B(Scalar(0)));
-      for_each_batch(cell, [&](std::size_t at, const auto& valid) {
-        const std::uint32_t* const member = &member_[at];
-        const B r = gather(residual.data(), member) * gather(contact.data(), member);
-        const std::array<B, corners> hat = hats(at);
-        for (std::size_t k = 0; k < corners; ++k) {
-          sums[k] = multiply_add(select(valid, r, B(Scalar(0))), hat[k], sums[k]);
-        }
-      });
-      cell_sums_[number_of(cell)] = sum_each(sums);
-    });
-    value_.assign(nodes(), 0.0);
-    for (const Cell& cell : cells_) {
-      const std::array<Scalar, corners>& sums = cell_sums_[number_of(cell)];
-      for (std::size_t k = 0; k < corners; ++k) {
-        value_[cell.node[k]] += static_cast<double>(sums[k]);
-      }
-    }
+    sum_at_nodes(residual, contact, threads, value_);
     double sum = 0;
     for (const double value : value_) {
       sum += std::abs(value);
@@ -99,6 +80,19 @@ class CoarseGrid {
       }
     }
     factorize();
+    sum_at_nodes(contact, contact, step.threads, weight_);
+  }
+
+  /// Whether around some node far more particles are in contact than when assemble() was called. What the matrix takes
+  /// for soft, because hardly anything was there, would be corrected out of all proportion.
+  bool outgrown(const std::vector<Scalar>& contact, Threads threads) noexcept {
+    sum_at_nodes(contact, contact, threads, weight_now_);
+    for (std::size_t n = 0; n < nodes(); ++n) {
+      if (weight_now_[n] > most_growth * weight_[n]) {
+        return true;
+      }
+    }
+    return false;
   }
 
   /// Puts z for what restrict() took into correction, one entry per particle. @param time_step [s].
@@ -125,6 +119,7 @@ class CoarseGrid {
  private:
   static constexpr std::size_t most_nodes = 1500;
   static constexpr Scalar supports_per_cell = Scalar(4);
+  static constexpr double most_growth = 1.5;         ///< of contacts around a node, for the matrix to be of use
   static constexpr Scalar coarsening = Scalar(1.4);  ///< of cells' widths, until there are few enough
   static constexpr std::size_t corners = 8;
   static constexpr Index cells_per_range = 8;
@@ -149,12 +144,19 @@ class CoarseGrid {
 
     static constexpr std::int32_t middle = 1 << 20;
 
-    /// Where x is, in cells. What is too far out, or not a number, goes somewhere.
-    [[gnu::always_inline]] Scalar place(Scalar x) const noexcept {
+    /// Which cell x is in, and where in it, 0 .. 1. What is too far out, or not a number, goes somewhere.
+    struct Place {
+      std::int32_t number;
+      Scalar along;
+    };
+    [[gnu::always_inline]] Place place(Scalar x) const noexcept {
       const Scalar within = period > 0 ? x - period * std::floor(x / period) : x;
-      const Scalar place = within / width + static_cast<Scalar>(middle);
-      const Scalar farthest = static_cast<Scalar>(2 * middle - 2);
-      return place > 0 ? std::min(place, farthest) : Scalar(0);
+      const Scalar cells = within / width, whole = std::floor(cells);
+      constexpr auto farthest = static_cast<Scalar>(middle - 2);
+      if (!(std::abs(whole) < farthest)) {
+        return {whole > 0 ? 2 * middle - 2 : 0, Scalar(0)};
+      }
+      return {static_cast<std::int32_t>(whole) + middle, cells - whole};  // apart: the sum has no room for both
     }
     /// Part of the key of the cell with this number, or of the node at its near end.
     [[gnu::always_inline]] std::uint64_t key(std::int32_t number) const noexcept {
@@ -226,6 +228,31 @@ class CoarseGrid {
       hat[k] = face[k] - hat[k + 4];
     }
     return hat;
+  }
+
+  /// Z^T v, over the particles with contact[i] == 1 (else 0).
+  void sum_at_nodes(const std::vector<Scalar>& values, const std::vector<Scalar>& contact, Threads threads,
+                    std::vector<double>& sums_at_nodes) noexcept {
+    for_each_cell(threads, [&](const Cell& cell) {
+      std::array<B, corners> sums;
+      sums.fill(B(Scalar(0)));
+      for_each_batch(cell, [&](std::size_t at, const auto& valid) {
+        const std::uint32_t* const member = &member_[at];
+        const B v = select(valid, gather(values.data(), member) * gather(contact.data(), member), B(Scalar(0)));
+        const std::array<B, corners> hat = hats(at);
+        for (std::size_t k = 0; k < corners; ++k) {
+          sums[k] = multiply_add(v, hat[k], sums[k]);
+        }
+      });
+      cell_sums_[number_of(cell)] = sum_each(sums);
+    });
+    sums_at_nodes.assign(nodes(), 0.0);
+    for (const Cell& cell : cells_) {
+      const std::array<Scalar, corners>& sums = cell_sums_[number_of(cell)];
+      for (std::size_t k = 0; k < corners; ++k) {
+        sums_at_nodes[cell.node[k]] += static_cast<double>(sums[k]);
+      }
+    }
   }
 
   /// What some particles feel, one per lane: a, then the rows of Q. Zero in lanes without a particle.
@@ -315,9 +342,11 @@ class CoarseGrid {
   void lay_out(const Step& step) {
     const auto& position = step.fluid.position;
     const Index count = step.fluid.size();
-    const Vector3<Scalar> extent = count > 0
-                                       ? Vector3<Scalar>(position.rowwise().maxCoeff() - position.rowwise().minCoeff())
-                                       : Vector3<Scalar>(Vector3<Scalar>::Zero());
+    Vector3<Scalar> extent = Vector3<Scalar>::Zero();
+    if (count > 0) {
+      extent = position.rowwise().maxCoeff() - position.rowwise().minCoeff();
+      extent = extent.array().isFinite().select(extent, Scalar(0));  // what is not a number has no order
+    }
     // The longest axis counts most: nodes that touch then have numbers close to each other, and the profile is small.
     std::array<std::size_t, 3> order{0, 1, 2};
     std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
@@ -361,8 +390,7 @@ class CoarseGrid {
     parallel_for(count, step.threads, [&](Index i) {
       std::uint64_t key = 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Scalar place = axes_[axis].place(step.fluid.position(static_cast<Index>(axis), i));
-        key += axes_[axis].key(static_cast<std::int32_t>(place));
+        key += axes_[axis].key(axes_[axis].place(step.fluid.position(static_cast<Index>(axis), i)).number);
       }
       key_[static_cast<std::size_t>(i)] = key;
     });
@@ -437,9 +465,8 @@ class CoarseGrid {
     for_each_cell(step.threads, [&](const Cell& cell) {
       for (std::size_t at = cell.begin; at < cell.end; ++at) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          const Scalar place =
-              axes_[axis].place(step.fluid.position(static_cast<Index>(axis), static_cast<Index>(member_[at])));
-          along_[axis][at] = place - std::floor(place);
+          const Scalar x = step.fluid.position(static_cast<Index>(axis), static_cast<Index>(member_[at]));
+          along_[axis][at] = axes_[axis].place(x).along;
         }
       }
     });
@@ -463,7 +490,9 @@ class CoarseGrid {
     }
     room(node_keys_, nodes() + 1);
     room(row_, nodes() + 1);
-    room(value_, nodes() + 1);
+    for (auto* values : {&value_, &weight_, &weight_now_}) {
+      room(*values, nodes() + 1);
+    }
     room(member_, member_.size() + 1);
     for (auto& along : along_) {
       room(along, member_.size() + 1);
@@ -521,8 +550,10 @@ class CoarseGrid {
         entry(a, b) = value;
         rest -= value * value;
       }
-      // a node without contact, or one that says nothing new, takes no part
-      entry(a, a) = rest > 1e-4 * whole ? 1 / std::sqrt(rest) : 0;
+      // A node without contact, or one that says nothing new, takes no part: of one that others make up for but for a
+      // hundredth (in length), sums of floats tell nothing.
+      constexpr double least_news = 1e-4;
+      entry(a, a) = rest > least_news * whole ? 1 / std::sqrt(rest) : 0;
     }
   }
 
@@ -555,6 +586,7 @@ class CoarseGrid {
   std::vector<std::uint32_t> first_{};
   std::vector<std::size_t> row_{};  ///< where column 0 of each row would be
   std::vector<double> matrix_{}, value_{};
+  std::vector<double> weight_{}, weight_now_{};  ///< particles in contact around each node: for the matrix, and now
 };
 
 }  // namespace decant::inline DECANT_TARGET

@@ -4,10 +4,14 @@
 /// Pressures that push where liquid is compressed and nowhere else.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <tuple>
+#include <type_traits>
 #include <vector>
 
+#include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
@@ -37,10 +41,10 @@ class ComplementaritySolver {
 
   double mean_tolerance = 1e-3;     ///< mean of what may be left amiss, over rest density [-], > 0
   double largest_tolerance = 3e-3;  ///< for any one particle [-], > 0
-  /// Mean of what regions (cells of CoarseGrid) may be amiss by as a whole, over rest density, > 0. What is left in a
-  /// region adds up over its depth and from one sub-step to the next: eighty layers that each give way by 1e-4 fall
-  /// through themselves, while particles that are amiss by ten times as much, some too dense and some too loose, do
-  /// not.
+  /// Mean of what regions (around the nodes of CoarseGrid) may be amiss by as a whole, over rest density, > 0. What is
+  /// left in a region adds up over its depth and from one sub-step to the next: eighty layers that each give way by
+  /// 1e-4 fall through themselves, while particles that are amiss by ten times as much, some too dense and some too
+  /// loose, do not.
   double net_tolerance = 3e-4;
   int most_iterations = 100;  ///< >= 1
 
@@ -92,7 +96,7 @@ class ComplementaritySolver {
       return report.converged;
     };
     const int patience = impatient_steps_ > 0 ? 0 : most_patience;
-    // @return whether cells take part from here on.
+    // @return whether the grid takes part from here on.
     const auto call_grid = [&] {
       if (by_grid || net_ <= net_allowed || report.iterations <= patience) {
         return false;
@@ -107,7 +111,9 @@ class ComplementaritySolver {
       if (judge(start) || report.iterations >= most_iterations) {
         return report;
       }
-      call_grid();
+      if (!call_grid() && by_grid && grid_.outgrown(contact_, step.threads)) {
+        grid_.assemble(step, system, contact_);
+      }
       Scope scope = by_grid ? Scope::Both : Scope::Particles;
       double product = precondition(step, system, squared_step, scope);
       direction_.swap(image_);
@@ -135,8 +141,9 @@ class ComplementaritySolver {
         if ((now.negative || now.touched) && (lopsided || since_start >= most_steps_between_starts)) {
           break;
         }
-        // When only whole regions are still amiss, a step by cells alone settles them; particles have no say in it, and
-        // what they ask for would take it seven more. Where it does not, the matrix is not that of these cells.
+        // When only whole regions are still amiss, a step by the grid alone settles them; particles have no say in it,
+        // and what they ask for would take it seven more. Where it does not, the grid's matrix is no longer that of
+        // these contacts.
         const bool was_whole = scope == Scope::Grid, fresh = call_grid();
         if (by_grid) {
           const bool whole = particles_done && !was_whole && steps_by_grid < most_steps_by_grid;
@@ -147,10 +154,7 @@ class ComplementaritySolver {
         const bool goes_on = !fresh && !was_whole && scope != Scope::Grid;
         const Scalar keep = goes_on ? static_cast<Scalar>(next_product / product) : Scalar(0);
         product = next_product;
-        parallel_for(count, step.threads, [&](Index i) {
-          const auto own = static_cast<std::size_t>(i);
-          direction_[own] = image_[own] + keep * direction_[own];
-        });
+        turn(step, keep);
       }
     }
   }
@@ -159,7 +163,7 @@ class ComplementaritySolver {
   static constexpr int least_steps_between_starts = 2, most_steps_between_starts = 6;
   static constexpr double largest_outside = 0.5;  ///< of what is amiss within the contacts
   static constexpr int most_steps_by_grid = 8;    ///< per solve
-  static constexpr int most_patience = 6;         ///< evaluations before cells are called
+  static constexpr int most_patience = 6;         ///< evaluations before the grid is called
   static constexpr int lasting_impatience = 8;  ///< sub-steps in which they are called at once, after they were needed
 
   /// Whose residuals a direction answers to.
@@ -182,19 +186,51 @@ class ComplementaritySolver {
     }
   };
 
-  /// Sum of term(i) over the particles, the same for any number of threads.
+  using B = Batch<Scalar>;
+
+  /// Calls f(number, at) for all of [begin, end), a batch at a time and what is left one by one: `number` is an empty
+  /// value of the type that f is to compute with.
+  template <class Function>
+  [[gnu::always_inline]] static void for_all(Index begin, Index end, Function&& f) noexcept {
+    auto at = static_cast<std::size_t>(begin);
+    for (; at + B::width <= static_cast<std::size_t>(end); at += B::width) {
+      f(std::type_identity<B>{}, at);
+    }
+    for (; at < static_cast<std::size_t>(end); ++at) {
+      f(std::type_identity<Scalar>{}, at);
+    }
+  }
+
+  /// Sum of term(number, at) over the particles, see for_all; the same for any number of threads.
   template <class Step, class Term>
   double sum_over(const Step& step, Term&& term) noexcept {
     return reduction_of_sums_.over(
         step.fluid.size(), step.threads, 0.0,
         [&](Index begin, Index end) {
-          double partial = 0;
-          for (Index i = begin; i < end; ++i) {
-            partial += term(static_cast<std::size_t>(i));
-          }
-          return partial;
+          B batches(Scalar(0));
+          Scalar rest = 0;
+          for_all(begin, end, [&](auto number, std::size_t at) {
+            if constexpr (std::is_same_v<typename decltype(number)::type, Scalar>) {
+              rest += term(number, at);
+            } else {
+              batches += term(number, at);
+            }
+          });
+          return static_cast<double>(sum(batches)) + static_cast<double>(rest);
         },
         [](double a, double b) { return a + b; });
+  }
+
+  /// The next direction, from image_ and `keep` times the last one.
+  template <class Step>
+  void turn(const Step& step, Scalar keep) noexcept {
+    parallel_ranges(
+        step.fluid.size(), threads_for(step.fluid.size(), step.threads), default_grain, [&](Index begin, Index end) {
+          for_all(begin, end, [&]<class Number>(std::type_identity<Number>, std::size_t at) {
+            store_as(multiply_add(Number(keep), load_as<Number>(&direction_[at]), load_as<Number>(&image_[at])),
+                     &direction_[at]);
+          });
+        });
   }
 
   /// Puts into image_ what residual_ asks for, over the contacts. Returns residual . image.
@@ -204,12 +240,16 @@ class ComplementaritySolver {
     if (scope != Scope::Particles) {
       grid_.solve(step.time_step, step.threads, smooth_);
     }
-    return sum_over(step, [&](std::size_t own) {
-      const Scalar slope = squared_step * system.diagonal()[own];
+    return sum_over(step, [&]<class Number>(std::type_identity<Number>, std::size_t at) {
+      const Number residual = load_as<Number>(&residual_[at]), contact = load_as<Number>(&contact_[at]),
+                   zero(Scalar(0));
+      const Number slope = Number(squared_step) * load_as<Number>(&system.diagonal()[at]);
       // what is not in contact may have no slope to divide by
-      const Scalar alone = scope != Scope::Grid && contact_[own] > 0 ? residual_[own] / slope : Scalar(0);
-      image_[own] = contact_[own] * (scope != Scope::Particles ? alone + smooth_[own] : alone);
-      return static_cast<double>(residual_[own]) * static_cast<double>(image_[own]);
+      const Number alone = scope != Scope::Grid ? select(contact > zero, residual / slope, zero) : zero;
+      const Number smooth = scope != Scope::Particles ? load_as<Number>(&smooth_[at]) : zero;
+      const Number asked = contact * (alone + smooth);
+      store_as(asked, &image_[at]);
+      return residual * asked;
     });
   }
 
@@ -259,12 +299,31 @@ class ComplementaritySolver {
   template <class Step>
   double apply(const Step& step, PressureSystem<Scalar>& system, Scalar squared_step) noexcept {
     system.accelerate(step.neighbors, direction_.data(), step.threads);
-    return sum_over(step, [&](std::size_t own) {
-      image_[own] =
-          -squared_step * system.density_rate(step.neighbors, system.accelerations(), static_cast<Index>(own), false);
-      return static_cast<double>(image_[own]) * static_cast<double>(direction_[own]);
-    });
+    return reduction_of_sums_.over(
+        step.fluid.size(), step.threads, 0.0,
+        [&](Index begin, Index end) {
+          double partial = 0;
+          for (Index i = begin; i < end; ++i) {
+            const auto own = static_cast<std::size_t>(i);
+            image_[own] = -squared_step * system.density_rate(step.neighbors, system.accelerations(), i, false);
+            partial += static_cast<double>(image_[own]) * static_cast<double>(direction_[own]);
+          }
+          return partial;
+        },
+        [](double a, double b) { return a + b; });
   }
+
+  /// What some particles add to a Progress, one number or a batch of them at a time.
+  template <class Number>
+  struct Tally {
+    Number amiss{Scalar(0)}, outside{Scalar(0)}, largest{Scalar(0)};
+    bool negative = false, touched = false;
+
+    Progress total() const noexcept {
+      return {static_cast<double>(sum(amiss)), static_cast<double>(sum(outside)),
+              static_cast<double>(largest_lane(largest)), negative, touched};
+    }
+  };
 
   template <class Step>
   Progress advance(const Step& step, const PressureSystem<Scalar>& system, std::vector<Scalar>& term, Scalar along,
@@ -272,34 +331,55 @@ class ComplementaritySolver {
     return reduction_.over(
         step.fluid.size(), step.threads, Progress{},
         [&](Index begin, Index end) {
-          Progress partial;
-          for (Index i = begin; i < end; ++i) {
-            const auto own = static_cast<std::size_t>(i);
-            term[own] += along * direction_[own];
-            residual_[own] -= along * image_[own];
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-              sum_[4 * own + axis] += along * system.accelerations()[4 * own + axis];
-            }
-            const Scalar left = residual_[own], slope = squared_step * system.diagonal()[own];
-            // a negative pressure will be clipped: its own push will be missing
-            partial.add(term[own] < 0 ? std::max(left, Scalar(0)) - term[own] * slope
-                                      : std::max(left, std::min(-left, term[own] * slope)));
+          std::tuple<Tally<B>, Tally<Scalar>> tallies;
+          for_all(begin, end, [&]<class Number>(std::type_identity<Number>, std::size_t at) {
+            const Number zero(Scalar(0));
+            const Number pressure =
+                multiply_add(Number(along), load_as<Number>(&direction_[at]), load_as<Number>(&term[at]));
+            const Number left =
+                multiply_add(Number(-along), load_as<Number>(&image_[at]), load_as<Number>(&residual_[at]));
+            store_as(pressure, &term[at]);
+            store_as(left, &residual_[at]);
+            const Number slope = Number(squared_step) * load_as<Number>(&system.diagonal()[at]);
+            const Number pull = zero - pressure * slope;  // of a negative pressure, which will be clipped
+            const auto negative = pressure < zero;
             // particles out of contact stay out until the next start
-            const bool touched = contact_[own] == 0 && left > 0 && slope > smallest_slope_;
-            partial.outside += static_cast<double>(term[own] < 0 ? -term[own] * slope : touched ? left : Scalar(0));
-            partial.negative = partial.negative || term[own] < 0;
-            partial.touched = partial.touched || touched;
-          }
-          return partial;
+            const auto touched =
+                (load_as<Number>(&contact_[at]) == zero) & (left > zero) & (slope > Number(smallest_slope_));
+            const Number amiss =
+                select(negative, maximum(left, zero) + pull, maximum(left, minimum(zero - left, zero - pull)));
+            auto& tally = std::get<Tally<Number>>(tallies);
+            tally.amiss += amiss;
+            tally.largest = maximum(amiss, tally.largest);
+            tally.outside += select(negative, pull, select(touched, left, zero));
+            tally.negative = tally.negative || any(negative);
+            tally.touched = tally.touched || any(touched);
+          });
+          add_up(system, begin, end, along);
+          return Progress::both(std::get<0>(tallies).total(), std::get<1>(tallies).total());
         },
         Progress::both);
+  }
+
+  /// Adds what the direction does to sum_, for some particles.
+  void add_up(const PressureSystem<Scalar>& system, Index begin, Index end, Scalar along) noexcept {
+    // the fourth number of a record is not an acceleration
+    std::array<Scalar, 4 + static_cast<std::size_t>(B::width)> factor;
+    for (std::size_t k = 0; k < factor.size(); ++k) {
+      factor[k] = k % 4 == 3 ? Scalar(0) : along;
+    }
+    for_all(4 * begin, 4 * end, [&]<class Number>(std::type_identity<Number>, std::size_t at) {
+      store_as(multiply_add(load_as<Number>(&factor[at % 4]), load_as<Number>(system.accelerations() + at),
+                            load_as<Number>(&sum_[at])),
+               &sum_[at]);
+    });
   }
 
   Scalar smallest_slope_ = 0;
   CoarseGrid<Scalar> grid_{};
   bool sorted_ = false;      ///< the grid, in this sub-step
   int impatient_steps_ = 0;  ///< sub-steps in which the grid is called at once
-  double net_ = 0;           ///< what cells are amiss by as a whole, summed over them [kg/m^3]
+  double net_ = 0;           ///< what regions are amiss by as a whole, summed over the grid's nodes [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
   std::vector<Scalar> contact_{};  ///< 1 or 0
   std::vector<Scalar> smooth_{};   ///< the grid's part of what residual_ asks for

@@ -3,6 +3,7 @@
 
 /// The linear system behind incompressible SPH: what pressures do to velocities, and what velocities do to densities.
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -124,9 +125,10 @@ class PressureSystem {
       }
       const Scalar* total = &total_[4 * own];
       Scalar* record = &records_[4 * own];
-      record[0] = -(factor * sum(x) + pressure_term[own] * total[0]);
-      record[1] = -(factor * sum(y) + pressure_term[own] * total[1]);
-      record[2] = -(factor * sum(z) + pressure_term[own] * total[2]);
+      const std::array<Scalar, 3> pushed = sum_each(std::array{x, y, z});
+      record[0] = -(factor * pushed[0] + pressure_term[own] * total[0]);
+      record[1] = -(factor * pushed[1] + pressure_term[own] * total[1]);
+      record[2] = -(factor * pushed[2] + pressure_term[own] * total[2]);
       record[3] = weight_[own];
     });
   }
@@ -213,13 +215,14 @@ class PressureSystem {
   }
 
   void finish(Index i, const Sums& sums, const Vector3<Scalar>& wall, Scalar flux) noexcept {
-    const Vector3<Scalar> total = Vector3<Scalar>(sum(sums.x), sum(sums.y), sum(sums.z)) + rest_density_ * wall;
+    const std::array<Scalar, 4> pairs = sum_each(std::array{sums.x, sums.y, sums.z, sums.squares});
+    const Vector3<Scalar> total = Vector3<Scalar>(pairs[0], pairs[1], pairs[2]) + rest_density_ * wall;
     Scalar* record = &total_[4 * static_cast<std::size_t>(i)];
     record[0] = total[0];
     record[1] = total[1];
     record[2] = total[2];
     record[3] = rest_density_ * flux;
-    diagonal_[static_cast<std::size_t>(i)] = sum(sums.squares) + total.squaredNorm();
+    diagonal_[static_cast<std::size_t>(i)] = pairs[3] + total.squaredNorm();
   }
 
   Index count_ = 0;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <decant/boundary/wall_state.hpp>
+#include <decant/core/domain.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/growable.hpp>
 #include <decant/core/parallel.hpp>
@@ -24,11 +25,11 @@
 namespace decant::inline DECANT_TARGET::testing {
 
 /// Liquid by itself with all that a StepView refers to, for trying forces and pressure solvers without a simulator.
-template <class KernelType>
+template <class KernelType, class Domain = OpenDomain>
 struct LooseLiquid {
   using Kernel = KernelType;
   using Scalar = typename Kernel::Scalar;
-  using Neighbors = NeighborList<Scalar>;
+  using Neighbors = NeighborList<Scalar, Domain>;
 
   FluidState<Scalar> fluid{};
   Neighbors neighbors{};
@@ -41,11 +42,13 @@ struct LooseLiquid {
   Scalar rest_density = Scalar(1000);       ///< [kg/m^3]
   Scalar time_step = Scalar(1e-3);          ///< [s]
   Threads threads{1};
+  Domain domain{};
 
   /// Puts particles of one spacing's volume at these places, at rest, and finds neighbours and densities. Benchmarks
   /// name a faster Search.
-  template <class Search = BruteForce<Scalar>>
+  template <class Search = BruteForce<Scalar, Domain>>
   void place(const PointArray<Scalar>& position) {
+    neighbors = Neighbors(domain);
     fluid.resize(position.cols());
     fluid.position = position;
     fluid.velocity.setZero();
@@ -69,9 +72,9 @@ struct LooseLiquid {
 
   /// Finds neighbours and densities again after positions have changed. @param margin see
   /// PressureSolver::search_margin.
-  template <class Search = BruteForce<Scalar>>
+  template <class Search = BruteForce<Scalar, Domain>>
   void update(double margin = 0) {
-    Search search;
+    Search search(domain);
     neighbors.build(search, fluid.position,
                     static_cast<Scalar>(static_cast<double>(Kernel::support_factor) * (1 + margin)) * smoothing_length,
                     threads);
