@@ -47,6 +47,7 @@
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>
 #include <decant/core/stopwatch.hpp>
+#include <decant/core/subnormal.hpp>
 #include <decant/core/types.hpp>
 #include <decant/correction/concept.hpp>
 #include <decant/correction/edge_fit.hpp>

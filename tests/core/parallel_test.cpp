@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include <decant/core/subnormal.hpp>
+
 #include "catch.hpp"
 
 using decant::Index;
@@ -117,3 +119,28 @@ TEST_CASE("Loops run on the threads that were asked for") {
   CHECK(most == 1);  // so few particles are not worth a second thread
 }
 #endif
+
+TEST_CASE("Loops take subnormal numbers for zero on all of their threads, and leave threads as they were") {
+  const volatile float smallest = std::numeric_limits<float>::min(), half = 0.5F;
+  const auto is_flushed = [&] { return smallest * half == 0; };
+  REQUIRE_FALSE(is_flushed());
+  for (const int threads : {1, 2, 4}) {
+    std::atomic<int> flushed = 0;
+    decant::parallel_ranges(8, Threads{threads}, 1, [&](Index, Index) { flushed += is_flushed() ? 1 : 0; });
+    INFO("threads " << threads);
+#if defined(__SSE2__) || defined(__aarch64__)
+    CHECK(flushed == 8);
+#endif
+    CHECK_FALSE(is_flushed());
+  }
+  std::atomic<int> flushed = 0;
+  {
+    const decant::SubnormalsAsZero outer;
+    { const decant::SubnormalsAsZero inner; }
+    flushed = is_flushed() ? 1 : 0;
+  }
+#if defined(__SSE2__) || defined(__aarch64__)
+  CHECK(flushed == 1);
+#endif
+  CHECK_FALSE(is_flushed());
+}

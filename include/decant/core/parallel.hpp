@@ -13,6 +13,7 @@
 #include <omp.h>
 #endif
 
+#include <decant/core/subnormal.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 
@@ -34,22 +35,28 @@ struct Threads {
 
 /// Calls f(begin, end) for consecutive ranges that cover [0, count). Ranges are of `grain` entries (the last may be
 /// shorter) whatever the number of threads, and are shared out however few they are: a range should be worth some
-/// microseconds, which is what waking a thread costs. f must not throw.
+/// microseconds, which is what waking a thread costs. f must not throw. It computes with SubnormalsAsZero, on any
+/// number of threads.
 template <class Function>
 void parallel_ranges(Index count, Threads threads, Index grain, Function&& f) {
   const Index ranges = (count + grain - 1) / grain;
 #ifdef _OPENMP
   const int workers = static_cast<int>(std::min<Index>(threads.resolved(), ranges));
   if (workers > 1) {
-#pragma omp parallel for schedule(static) num_threads(workers)
-    for (Index r = 0; r < ranges; ++r) {
-      f(r * grain, std::min(count, (r + 1) * grain));
+#pragma omp parallel num_threads(workers)
+    {
+      const SubnormalsAsZero quick;
+#pragma omp for schedule(static)
+      for (Index r = 0; r < ranges; ++r) {
+        f(r * grain, std::min(count, (r + 1) * grain));
+      }
     }
     return;
   }
 #else
   (void)threads;
 #endif
+  const SubnormalsAsZero quick;
   for (Index r = 0; r < ranges; ++r) {
     f(r * grain, std::min(count, (r + 1) * grain));
   }
