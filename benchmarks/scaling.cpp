@@ -283,7 +283,7 @@ DistortedPinholeCamera camera_of(int width) {
   return {PinholeCamera(1.4 * width, 1.4 * width, 0.5 * (width - 1), 0.5 * (height - 1), width, height), {}};
 }
 
-/// Masks of all of a tracker's cameras as they would be if its liquid were 2 mm (at 640 x 480 some 4 px) away along x,
+/// Masks of all of a tracker's cameras as they would be if its liquid were 2 mm (at 640 x 480 some 6 px) away along x,
 /// one way and the other, in turns: so that each frame has something to correct.
 class ShiftingMasks {
  public:
