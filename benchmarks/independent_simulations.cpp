@@ -20,42 +20,29 @@
 
 #include "child_process.hpp"
 #include "common.hpp"
+#include "cup_simulations.hpp"
 
 namespace {
 
 using namespace decant_benchmark;
 using decant::Index;
 using Model = decant::LiquidSimulator;
-using decant::SimulatorSettings;
 
 constexpr double frame = 1.0 / 30;  // [s]
 
-SimulatorSettings settings_for(double spacing, int threads) {
-  SimulatorSettings settings;
-  settings.spacing = spacing;
-  settings.threads = {threads};
-  return decant::for_tracking(settings);
-}
-
 /// The cup with its liquid at rest, just before it is tilted.
 Model filled_cup(double spacing) {
-  Model model(settings_for(spacing, 1));  // on one thread, as child processes follow
+  Model model(tracking_settings(spacing, 1));  // on one thread, as child processes follow
   const decant::Pose upright, tilted{Eigen::Quaterniond(Eigen::AngleAxisd(1.047, Eigen::Vector3d::UnitX())), {0, 0, 0}};
   const decant::BodyId body = model.add_body("cup", decant::Cup{}, decant::PoseTrack({{0, upright}, {1, tilted}}));
   decant::fill(model, body, decant::FillAmount::fraction(0.6));
   return model;
 }
 
-/// One more simulation in the same state, with scratch memory of its own. Throws std::runtime_error if it does not
-/// share the first one's body. @param number differs from copy to copy, as do the particles' velocities by a millimetre
+/// One more simulation. @param number differs from copy to copy, as do the particles' velocities by a millimetre
 /// per second: simulations that are equal to the last bit would predict each other's branches.
 Model another(const Model& first, const Model::Snapshot& state, int threads, unsigned number) {
-  Model model(settings_for(first.spacing(), threads));
-  model.restore(state);
-  const auto &mine = model.bodies()[0], &its = first.bodies()[0];
-  if (mine.shape != its.shape || mine.surface != its.surface || mine.wall != its.wall) {
-    throw std::runtime_error("simulations do not share their bodies");
-  }
+  Model model = decant_benchmark::another(first, state, threads);
   std::mt19937 generator(number);
   std::uniform_real_distribution<float> nudge(-1e-3f, 1e-3f);
   for (Index i = 0; i < model.fluid().size(); ++i) {

@@ -30,6 +30,7 @@
 
 #include "child_process.hpp"
 #include "common.hpp"
+#include "cup_simulations.hpp"
 #include "inputs.hpp"
 
 namespace {
@@ -243,30 +244,11 @@ using ModelTracker = Tracker<Model, SilhouetteCorrector<>>;
 constexpr double frame_time = 1.0 / 30;  // [s]
 constexpr int first_frames = 2;          // in which buffers grow
 
-SimulatorSettings settings_for(double particle_spacing, int threads) {
-  SimulatorSettings settings;
-  settings.spacing = particle_spacing;
-  settings.threads = {threads};
-  return for_tracking(settings);
-}
-
 /// A cup that stands, 80 % full. On one thread, as child processes follow.
 Model filled_cup(double particle_spacing) {
-  Model model(settings_for(particle_spacing, 1));
+  Model model(tracking_settings(particle_spacing, 1));
   const BodyId body = model.add_body("cup", Cup{});
   fill(model, body, FillAmount::fraction(0.8));
-  return model;
-}
-
-/// One more simulation in the same state, with scratch memory of its own. Throws std::runtime_error unless it shares
-/// the first one's body.
-Model another(const Model& first, int threads) {
-  Model model(settings_for(first.spacing(), threads));
-  model.restore(first.snapshot());
-  const auto &mine = model.bodies()[0], &its = first.bodies()[0];
-  if (mine.shape != its.shape || mine.surface != its.surface || mine.wall != its.wall) {
-    throw std::runtime_error("simulations do not share their bodies");
-  }
   return model;
 }
 
@@ -316,7 +298,7 @@ struct FrameTimes {
 FrameTimes track_cup(const Model& cup, int cameras, int width, int frames, int threads) {
   TrackerSettings settings;
   settings.threads = {threads};
-  ModelTracker tracker(another(cup, threads), {}, settings);
+  ModelTracker tracker(another(cup, cup.snapshot(), threads), {}, settings);
   for (int camera = 0; camera < cameras; ++camera) {
     tracker.add_camera(camera_of(width), camera_around(camera, cameras));
   }
@@ -518,7 +500,7 @@ double track_hypotheses(const Model& cup, int count, int frames, int threads) {
   std::mt19937 generator(1);
   std::uniform_real_distribution<float> nudge(-1e-3F, 1e-3F);
   for (int k = 0; k < count; ++k) {
-    Model model = another(cup, 1);
+    Model model = another(cup, cup.snapshot(), 1);
     for (Index i = 0; i < model.fluid().size(); ++i) {
       model.fluid().velocity(0, i) += nudge(generator);
     }
