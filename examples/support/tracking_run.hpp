@@ -22,16 +22,16 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/force/linear_drag.hpp>
+#include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/hypothesis/value_estimate.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/contents.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
 #include <decant/tracking/fixed_lag_tracker.hpp>
-#include <decant/tracking/hypothesis_filter.hpp>
 #include <decant/tracking/overlap_score.hpp>
 #include <decant/tracking/tracker.hpp>
-#include <decant/tracking/value_estimate.hpp>
 
 namespace example {
 

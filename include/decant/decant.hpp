@@ -77,6 +77,8 @@
 #include <decant/force/viscosity.hpp>
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
+#include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>
 #include <decant/kernel/mueller_viscosity.hpp>
@@ -112,7 +114,6 @@
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
 #include <decant/tracking/fixed_lag_tracker.hpp>
-#include <decant/tracking/hypothesis_filter.hpp>
 #include <decant/tracking/image_likelihood.hpp>
 #include <decant/tracking/liquid_model.hpp>
 #include <decant/tracking/mask_trust.hpp>
@@ -120,6 +121,5 @@
 #include <decant/tracking/overlap_score.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
-#include <decant/tracking/value_estimate.hpp>
 #include <decant/tracking/volume_error.hpp>
 #include <decant/version.hpp>

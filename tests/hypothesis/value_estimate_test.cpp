@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include <decant/tracking/value_estimate.hpp>
+#include <decant/hypothesis/value_estimate.hpp>
 
 #include "catch.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <decant/correction/open_loop.hpp>
 #include <decant/correction/transport_corrector.hpp>
-#include <decant/tracking/hypothesis_filter.hpp>
+#include <decant/hypothesis/hypothesis_filter.hpp>
 
 #include "catch.hpp"
 #include "tracking/falling_dust.hpp"
