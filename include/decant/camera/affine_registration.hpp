@@ -10,7 +10,6 @@
 #include <string_view>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include <decant/camera/affine_map.hpp>
@@ -74,8 +73,12 @@ inline Eigen::ArrayXd affine_residuals(const AffineMap::Matrix& map, const Point
 // Root mean squared distance [px] from the straight line that fits the points best: zero if they are collinear.
 inline double extent_across(const Points2& points) {
   const Points2 centred = points.colwise() - points.rowwise().mean();
-  const Eigen::Matrix2d scatter = centred * centred.transpose() / static_cast<double>(points.cols());
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter, false).eigenvalues()(0)));
+  // The smaller eigenvalue of the 2 x 2 scatter, from its determinant and the larger one: Eigen's solver, which is
+  // written for any size, takes compilers several seconds.
+  const double xx = centred.row(0).squaredNorm(), yy = centred.row(1).squaredNorm();
+  const double xy = centred.row(0).dot(centred.row(1));
+  const double larger = 0.5 * (xx + yy) + std::hypot(0.5 * (xx - yy), xy);
+  return larger > 0 ? std::sqrt(std::max(0.0, (xx * yy - xy * xy) / larger) / static_cast<double>(points.cols())) : 0;
 }
 
 // Whether the chosen points fix a map in both directions.
@@ -95,12 +98,13 @@ inline bool spread_enough(const Points2& points, const Eigen::Array<bool, Eigen:
 inline AffineMap::Matrix least_squares_affine(const Points2& from, const Points2& to,
                                               const Eigen::Array<bool, Eigen::Dynamic, 1>& chosen) {
   const Eigen::RowVectorXd weight = chosen.cast<double>().matrix().transpose() / static_cast<double>(chosen.count());
-  const Eigen::Vector2d from_centre = from * weight.transpose();
-  const Eigen::Vector2d to_centre = to * weight.transpose();
-  const Points2 centred = from.colwise() - from_centre;
+  // sums of some dozen terms: lazyProduct spares compilers Eigen's product of large matrices
+  const Eigen::Vector2d from_centre = from.lazyProduct(weight.transpose());
+  const Eigen::Vector2d to_centre = to.lazyProduct(weight.transpose());
+  const Points2 centred = from.colwise() - from_centre, to_centred = to.colwise() - to_centre;
   const Points2 weighted = centred.array().rowwise() * weight.array();
-  const Eigen::Matrix2d linear =
-      ((to.colwise() - to_centre) * weighted.transpose()) * (centred * weighted.transpose()).inverse();
+  const Eigen::Matrix2d linear = Eigen::Matrix2d(to_centred.lazyProduct(weighted.transpose())) *
+                                 Eigen::Matrix2d(centred.lazyProduct(weighted.transpose())).inverse();
   AffineMap::Matrix map;
   map << linear, to_centre - linear * from_centre;
   return map;
