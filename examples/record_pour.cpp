@@ -23,7 +23,7 @@ int main(int count, char** values) {
   app.add_option("--out", out, "new folder for the recording")->required();
   app.add_option("--container", twin.container, "cup or bottle")->check(CLI::IsMember({"cup", "bottle"}));
   app.add_option("--fill", twin.fill_fraction, "share of the container that is full at first")
-      ->check(CLI::Range(0.01, 1.0));
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--seed", twin.seed, "decides on motion, noise and hidden physics");
   app.add_option("--spacing-mm", spacing_mm, "of the reality's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--seconds", twin.duration, "length of the recording")->check(CLI::Range(0.1, 60.0));

@@ -415,7 +415,7 @@ inline void record_pour(
     const PourTwin& twin, const std::filesystem::path& folder,
     const std::function<void(double)>& progress = [](double) {}) {
   using namespace decant;
-  expects(twin.fill_fraction > 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in (0, 1]",
+  expects(twin.fill_fraction >= 0 && twin.fill_fraction <= 1, "PourTwin: fill_fraction", "in [0, 1]",
           twin.fill_fraction);
   const HiddenPhysics hidden = draw_hidden_physics(twin);
   // position-based liquid as deep as in a bottle throws itself out of it
