@@ -78,6 +78,7 @@
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/hypothesis/independent_groups.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>
