@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// How probable each of several hypotheses is, by how far what it predicted was from what was measured, and how
+/// probable it is that none of them is so.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// How far a prediction was from what was measured, of one frame or added up over many: of cells of masks, of levels,
+/// of anything that has one unit.
+struct Misfit {
+  double squared = 0;   ///< sum of squared differences
+  double measured = 0;  ///< sum of squares of what was measured: what predicting nothing at all is off by
+
+  Misfit& operator+=(const Misfit& other) noexcept {
+    squared += other.squared;
+    measured += other.measured;
+    return *this;
+  }
+};
+
+struct PosteriorSettings {
+  /// How many independent errors a model makes in all, > 0. Differences in neighbouring cells and successive frames
+  /// come from the same few errors (a pose, a delay, friction), so this is far below the number of cells, and does not
+  /// grow with it.
+  double independent_errors = 30;
+  /// What a right prediction may be off by where next to nothing has been seen, in the unit of Misfit::squared, > 0.
+  double least_squared = 5;
+  /// A prediction that is off by more than this share of Misfit::measured is worse than "none of these", in (0, 1].
+  double hopeless_share = 0.6;
+  /// Of "none of these" before anything is seen, in [0, 1); 0: one of the hypotheses is right.
+  double none_prior = 0.05;
+};
+
+/// Hypotheses and their probabilities. How large errors of a right model are is not known beforehand (the model is
+/// never right), so it is marginalised: with an inverse-gamma prior the likelihood of differences with the sum of
+/// squares D is
+///   log p = -(n / 2) log(1 + D / D_0),
+/// which makes ratios of D count and not their sizes (Student's t; Gelman et al., Bayesian Data Analysis, 2013, section
+/// 3.2), and cannot underflow however many frames there are. Where even the best prediction is far off, differences
+/// between them say little.
+class Posterior {
+ public:
+  using Settings = PosteriorSettings;
+
+  /// Throws std::invalid_argument if a setting is out of range.
+  explicit Posterior(const Settings& settings = {}) : settings_(settings) {
+    expects(settings.independent_errors > 0 && std::isfinite(settings.independent_errors),
+            "Posterior: independent_errors", "> 0", settings.independent_errors);
+    expects(settings.least_squared > 0 && std::isfinite(settings.least_squared), "Posterior: least_squared", "> 0",
+            settings.least_squared);
+    expects(settings.hopeless_share > 0 && settings.hopeless_share <= 1, "Posterior: hopeless_share", "in (0, 1]",
+            settings.hopeless_share);
+    expects(settings.none_prior >= 0 && settings.none_prior < 1, "Posterior: none_prior", "in [0, 1)",
+            settings.none_prior);
+  }
+
+  /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
+  /// @return its number, counting from 0.
+  std::size_t add(double log_prior = 0) {
+    expects(std::isfinite(log_prior), "Posterior: log_prior", "finite", log_prior);
+    hypotheses_.push_back({log_prior, {}, false});
+    return hypotheses_.size() - 1;
+  }
+
+  /// Adds what one more frame says. What is not finite excludes the hypothesis.
+  void observe(std::size_t hypothesis, const Misfit& misfit) noexcept {
+    Hypothesis& one = hypotheses_[hypothesis];
+    one.misfit += misfit;
+    one.excluded = one.excluded || !std::isfinite(one.misfit.squared) || !std::isfinite(one.misfit.measured);
+  }
+  /// Gives a hypothesis no probability from now on.
+  void exclude(std::size_t hypothesis) noexcept { hypotheses_[hypothesis].excluded = true; }
+
+  std::size_t size() const noexcept { return hypotheses_.size(); }
+  bool excluded(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).excluded; }
+  const Misfit& misfit(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).misfit; }
+
+  /// Log likelihood of a sum of squared differences [nat], 0 for none.
+  double log_likelihood(double squared) const noexcept {
+    return -0.5 * settings_.independent_errors * std::log1p(squared / settings_.least_squared);
+  }
+
+  /// Prior and likelihood [nat], up to a constant that all share; -infinity for one that is excluded.
+  double log_posterior(std::size_t hypothesis) const {
+    const Hypothesis& one = hypotheses_.at(hypothesis);
+    return one.excluded ? -std::numeric_limits<double>::infinity() : one.log_prior + log_likelihood(one.misfit.squared);
+  }
+  /// The same for "none of these", which is taken to predict what hopeless_share says; -infinity if it has no prior.
+  double log_posterior_of_none() const noexcept {
+    if (settings_.none_prior == 0) {
+      return -std::numeric_limits<double>::infinity();
+    }
+    double measured = 0;
+    for (const Hypothesis& one : hypotheses_) {
+      measured = std::max(measured, one.excluded ? 0.0 : one.misfit.measured);
+    }
+    const double odds = settings_.none_prior / (1 - settings_.none_prior);
+    return std::log(odds) + total_log_prior() + log_likelihood(settings_.hopeless_share * measured);
+  }
+
+  double probability(std::size_t hypothesis) const {
+    const double own = log_posterior(hypothesis);
+    return std::isfinite(own) ? std::exp(own - log_sum()) : 0;
+  }
+  /// 1 if all hypotheses are excluded, and "none of these" was allowed at all.
+  double probability_of_none() const noexcept {
+    const double own = log_posterior_of_none();
+    return std::isfinite(own) ? std::exp(own - log_sum()) : 0;
+  }
+
+  /// The most probable one; of equals the first. "None of these" does not count.
+  std::size_t best() const noexcept {
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < hypotheses_.size(); ++k) {
+      if (log_posterior(k) > log_posterior(best)) {
+        best = k;
+      }
+    }
+    return best;
+  }
+
+  const Settings& settings() const noexcept { return settings_; }
+
+ private:
+  struct Hypothesis {
+    double log_prior;
+    Misfit misfit;
+    bool excluded;
+  };
+
+  // Priors are up to a constant: "none of these" has its share of what they come to.
+  double total_log_prior() const noexcept {
+    double total = 0;
+    for (const Hypothesis& one : hypotheses_) {
+      total += std::exp(one.log_prior);
+    }
+    return std::log(total);
+  }
+  double log_sum() const noexcept {
+    double largest = log_posterior_of_none();
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      largest = std::max(largest, log_posterior(k));
+    }
+    double total = std::exp(log_posterior_of_none() - largest);
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      total += std::exp(log_posterior(k) - largest);
+    }
+    return largest + std::log(total);
+  }
+
+  Settings settings_;
+  std::vector<Hypothesis> hypotheses_{};
+};
+
+}  // namespace decant::inline DECANT_TARGET

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <decant/hypothesis/posterior.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+namespace {
+
+double sum_of(const Posterior& posterior) {
+  double total = posterior.probability_of_none();
+  for (std::size_t k = 0; k < posterior.size(); ++k) {
+    total += posterior.probability(k);
+  }
+  return total;
+}
+
+/// Hypotheses with these sums of squares, of which none is ruled out by size alone.
+Posterior seen(const std::vector<double>& squared, double measured, const PosteriorSettings& settings = {}) {
+  Posterior posterior(settings);
+  for (const double each : squared) {
+    posterior.observe(posterior.add(), {each, measured});
+  }
+  return posterior;
+}
+
+}  // namespace
+
+TEST_CASE("posterior: before anything is seen it is the prior") {
+  PosteriorSettings settings;
+  settings.none_prior = 0.2;
+  Posterior posterior(settings);
+  posterior.add(std::log(6.0));
+  posterior.add(std::log(2.0));
+  CHECK(posterior.probability(0) == Approx(0.6));
+  CHECK(posterior.probability(1) == Approx(0.2));
+  CHECK(posterior.probability_of_none() == Approx(0.2));
+  CHECK(posterior.best() == 0);
+}
+
+TEST_CASE("posterior: the likelihood is that of a variance that is integrated out") {
+  // Differences d_1 .. d_n, normal with variance s; s has the inverse-gamma density of shape a and scale b, in the
+  // limit of small a, where the likelihood is (b + D / 2)^-(n / 2) up to a constant. Here by quadrature over log s.
+  PosteriorSettings settings;
+  settings.independent_errors = 7;
+  settings.least_squared = 3;
+  const Posterior posterior(settings);
+  const auto integrated = [&](double squared) {
+    const double b = settings.least_squared / 2;
+    double total = 0;
+    for (double log_s = -12; log_s < 40; log_s += 1e-3) {
+      const double s = std::exp(log_s);
+      total += std::pow(s, -settings.independent_errors / 2) * std::exp(-(squared / 2 + b) / s) * 1e-3;
+    }
+    return std::log(total);
+  };
+  for (const double squared : {0.5, 4.0, 60.0}) {
+    CHECK(posterior.log_likelihood(squared) == Approx(integrated(squared) - integrated(0)).margin(1e-4));
+  }
+}
+
+TEST_CASE("posterior: ratios of misfits count, and not their sizes") {
+  const auto small = seen({100, 200}, 1000), large = seen({1000, 2000}, 10000);
+  const auto lead = [](const Posterior& posterior) { return posterior.log_posterior(0) - posterior.log_posterior(1); };
+  CHECK(lead(small) == Approx(lead(large)).epsilon(0.05));
+  CHECK(lead(small) > 5);
+  CHECK(small.best() == 0);
+  CHECK(sum_of(small) == Approx(1));
+}
+
+TEST_CASE("posterior: none of these, if all are far from what was measured") {
+  CHECK(seen({100, 300}, 1000).probability_of_none() < 1e-6);
+  const auto lost = seen({900, 950}, 1000);
+  CHECK(lost.probability_of_none() > 0.5);
+  CHECK(sum_of(lost) == Approx(1));
+  PosteriorSettings certain;
+  certain.none_prior = 0;
+  CHECK(seen({900, 950}, 1000, certain).probability_of_none() == 0);
+  CHECK(sum_of(seen({900, 950}, 1000, certain)) == Approx(1));
+}
+
+TEST_CASE("posterior: ten thousand frames neither underflow nor forget") {
+  Posterior posterior;
+  posterior.add();
+  posterior.add();
+  for (int frame = 0; frame < 10000; ++frame) {
+    posterior.observe(0, {3, 40});
+    posterior.observe(1, {3.3, 40});
+  }
+  CHECK(std::isfinite(posterior.log_posterior(1)));
+  const double n = posterior.settings().independent_errors;
+  CHECK(posterior.log_posterior(0) - posterior.log_posterior(1) == Approx(0.5 * n * std::log(1.1)).epsilon(1e-3));
+  CHECK(sum_of(posterior) == Approx(1));
+
+  // so far apart that no double could hold the likelihoods
+  PosteriorSettings sure;
+  sure.independent_errors = 1e6;
+  const auto apart = seen({1, 1e9}, 1e9, sure);
+  CHECK(apart.probability(0) == Approx(1));
+  CHECK(apart.probability(1) == 0);
+  CHECK(sum_of(apart) == Approx(1));
+}
+
+TEST_CASE("posterior: what is not a number excludes a hypothesis, and nothing else") {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  Posterior posterior;
+  posterior.add();
+  posterior.add();
+  posterior.observe(0, {nan, 10});
+  posterior.observe(1, {1, 10});
+  CHECK(posterior.excluded(0));
+  CHECK(posterior.probability(0) == 0);
+  CHECK(posterior.best() == 1);
+  CHECK(sum_of(posterior) == Approx(1));
+  posterior.exclude(1);
+  CHECK(posterior.probability_of_none() == Approx(1));
+}
+
+TEST_CASE("posterior: settings out of range are refused") {
+  const auto with = [](auto set) {
+    PosteriorSettings settings;
+    set(settings);
+    return Posterior(settings);
+  };
+  CHECK_THROWS_WITH(with([](auto& s) { s.independent_errors = 0; }), Catch::Contains("independent_errors"));
+  CHECK_THROWS_WITH(with([](auto& s) { s.least_squared = -1; }), Catch::Contains("least_squared"));
+  CHECK_THROWS_WITH(with([](auto& s) { s.hopeless_share = 1.5; }), Catch::Contains("hopeless_share"));
+  CHECK_THROWS_WITH(with([](auto& s) { s.none_prior = 1; }), Catch::Contains("none_prior"));
+  CHECK_THROWS_WITH(Posterior().add(std::nan("")), Catch::Contains("log_prior"));
+}
