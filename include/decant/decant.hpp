@@ -79,6 +79,7 @@
 #include <decant/force/viscosity_weiler2018.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/hypothesis/independent_groups.hpp>
+#include <decant/hypothesis/posterior.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>

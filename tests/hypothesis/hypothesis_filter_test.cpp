@@ -32,7 +32,7 @@ DustTracker<CorrectorType> falling_with(double gravity) {
 /// Hypotheses that the dust falls with 0, 1, 2, 3 and 4 m/s^2. @param frames of what really falls with 2 m/s^2.
 template <class CorrectorType>
 HypothesisFilter<DustTracker<CorrectorType>> after(int frames, HypothesisFilterSettings settings = {}) {
-  settings.cell_deviation = 0.5;
+  settings.posterior.least_squared = 0.5;  // dust is thin, and its model right to the last bit
   HypothesisFilter<DustTracker<CorrectorType>> filter(settings);
   for (int gravity = 0; gravity <= 4; ++gravity) {
     filter.add(falling_with<CorrectorType>(-gravity));
@@ -60,7 +60,7 @@ TEST_CASE("hypothesis filter: finds what is so, and gives up what is not", "[hyp
   CHECK(lead(open) > -std::log(HypothesisFilterSettings{}.least_probability));
   CHECK(lead(open) < 1000);
   CHECK(lead(after<OpenLoop<double>>(10)) == Approx(lead(open)));
-  double total = 0;
+  double total = open.probability_of_none();
   for (std::size_t k = 0; k < open.size(); ++k) {
     total += open.probability(k);
   }
@@ -95,12 +95,14 @@ TEST_CASE("hypothesis filter: a corrector that makes every hypothesis fit does n
     before += SilhouetteCells(20).squared_difference(alone.predicted_before(0), alone.observed(0));
     after_it += SilhouetteCells(20).squared_difference(alone.predicted(0), alone.observed(0));
   }
-  CHECK(corrected.log_posterior(4) == Approx(-0.5 * before / (0.5 * 0.5)));
+  CHECK(corrected.posterior().misfit(4).squared == Approx(before));
   CHECK(after_it < 0.5 * before);
 }
 
 TEST_CASE("hypothesis filter: before anything is seen there is the prior, and frames that are refused say nothing") {
-  HypothesisFilter<DustTracker<OpenLoop<double>>> filter;
+  HypothesisFilterSettings one_is_right;
+  one_is_right.posterior.none_prior = 0;
+  HypothesisFilter<DustTracker<OpenLoop<double>>> filter(one_is_right);
   filter.add(falling_with<OpenLoop<double>>(-1), std::log(3.0));
   filter.add(falling_with<OpenLoop<double>>(-2));
   CHECK(filter.probability(0) == Approx(0.75));
@@ -123,7 +125,7 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
   CHECK(filter.report(0).status == FrameStatus::ModelFailed);
   CHECK(filter.given_up(0));
   CHECK(filter.log_posterior(0) == -std::numeric_limits<double>::infinity());
-  CHECK(filter.probability(1) == 1);
+  CHECK(filter.probability(1) + filter.probability_of_none() == Approx(1));
   CHECK(filter.best() == 1);
   CHECK(filter.track({0.2, {}, {}}).advanced());
   filter.tracker(1).model().broken = true;
@@ -151,8 +153,8 @@ TEST_CASE("hypothesis filter: the same bits for 1, 2 and 4 threads", "[threads]"
 TEST_CASE("hypothesis filter: settings are checked") {
   using Filter = HypothesisFilter<DustTracker<OpenLoop<double>>>;
   HypothesisFilterSettings settings;
-  settings.cell_deviation = 0;
-  CHECK_THROWS_WITH(Filter(settings), decant_test::contains("cell_deviation must be > 0"));
+  settings.posterior.least_squared = 0;
+  CHECK_THROWS_WITH(Filter(settings), decant_test::contains("least_squared must be > 0"));
   settings = {};
   settings.least_probability = 1;
   CHECK_THROWS_WITH(Filter(settings), decant_test::contains("in [0, 1)"));

@@ -15,6 +15,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
+#include <decant/hypothesis/posterior.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
@@ -22,22 +23,17 @@ namespace decant::inline DECANT_TARGET {
 
 /// Settings of HypothesisFilter.
 struct HypothesisFilterSettings {
-  int cell_px = 20;  ///< see SilhouetteCells, >= 1
-  /// Standard deviation of a cell's share of liquid, if the hypothesis is right, > 0. By itself a cell in a frame is
-  /// off by 0.1 to 0.2; but a jet that is a little off is so for some ten frames and across some cells, which count as
-  /// one. With 1, amounts estimated in eight pours of twins were off by 1.3 times the deviation that was stated, and
-  /// eight are few.
-  double cell_deviation = 1.4;
-  double least_probability = 1e-6;  ///< hypotheses below are given up, in [0, 1); 0: none
+  int cell_px = 20;  ///< see SilhouetteCells, >= 1; misfits are counted in cells
+  PosteriorSettings posterior{};
+  double least_probability = 1e-6;  ///< hypotheses below this share of the best one's are given up, in [0, 1); 0: none
   Threads threads{};                ///< over which hypotheses are shared out
 };
 
 /// Runs a tracker for each hypothesis on the same frames and keeps their posterior probabilities. The evidence is in
-/// what a tracker predicted before it was corrected by the frame,
-///   log p = -sum over cells of (predicted - observed share)^2 / (2 deviation^2):
-/// a strong corrector makes any hypothesis fit the mask that it has just seen. Frames in which no mask was believed say
-/// nothing. Works with any corrector, OpenLoop among them, which is the paper's way (Schenck and Fox 2017, section
-/// V-B).
+/// what a tracker predicted before it was corrected by the frame, the sum over cells of the squared difference between
+/// the predicted and the observed share of liquid: a strong corrector makes any hypothesis fit the mask that it has
+/// just seen. What such sums are worth is Posterior's to say. Frames in which no mask was believed say nothing. Works
+/// with any corrector, OpenLoop among them (Schenck and Fox 2017, section V-B, has both).
 template <class TrackerType>
 class HypothesisFilter {
  public:
@@ -45,9 +41,8 @@ class HypothesisFilter {
   using Settings = HypothesisFilterSettings;
 
   /// Throws std::invalid_argument if a setting is out of range.
-  explicit HypothesisFilter(const Settings& settings = {}) : settings_(settings), cells_(settings.cell_px) {
-    expects(settings.cell_deviation > 0 && std::isfinite(settings.cell_deviation), "HypothesisFilter: cell_deviation",
-            "> 0", settings.cell_deviation);
+  explicit HypothesisFilter(const Settings& settings = {})
+      : settings_(settings), cells_(settings.cell_px), posterior_(settings.posterior) {
     expects(settings.least_probability >= 0 && settings.least_probability < 1, "HypothesisFilter: least_probability",
             "in [0, 1)", settings.least_probability);
   }
@@ -56,9 +51,9 @@ class HypothesisFilter {
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
   /// @return its number, counting from 0.
   std::size_t add(Tracker tracker, double log_prior = 0) {
-    expects(std::isfinite(log_prior), "HypothesisFilter: log_prior", "finite", log_prior);
-    hypotheses_.push_back({std::move(tracker), {}, log_prior, 0, 0});
-    return hypotheses_.size() - 1;
+    const std::size_t number = posterior_.add(log_prior);
+    hypotheses_.push_back({std::move(tracker), {}, {}, 0});
+    return number;
   }
 
   /// Takes all hypotheses to the frame's time. A hypothesis whose model fails is given up, as long as another one
@@ -76,9 +71,14 @@ class HypothesisFilter {
       Hypothesis& hypothesis = hypotheses_[static_cast<std::size_t>(begin)];
       if (hypothesis.tracker) {
         hypothesis.report = hypothesis.tracker->track(frame);
-        hypothesis.log_evidence += log_evidence_of(frame, hypothesis);
+        hypothesis.misfit = misfit_of(frame, hypothesis);
       }
     });
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      if (hypotheses_[k].tracker) {
+        posterior_.observe(k, hypotheses_[k].misfit);
+      }
+    }
     give_up();
     return hypotheses_[given_up(before) && !hypotheses_[before].report.advanced() ? best() : before].report;
   }
@@ -95,35 +95,19 @@ class HypothesisFilter {
   /// Prior and evidence [nat], up to a constant that all share. One that was given up stays as far below the most
   /// probable one as it was then, which is at most what more frames would have left it; -infinity if its model failed.
   double log_posterior(std::size_t hypothesis) const {
-    const Hypothesis& one = hypotheses_.at(hypothesis);
-    return one.tracker ? one.log_posterior() : hypotheses_[best()].log_posterior() - one.behind;
+    return given_up(hypothesis) ? posterior_.log_posterior(best()) - hypotheses_[hypothesis].behind
+                                : posterior_.log_posterior(hypothesis);
   }
 
-  /// Among all hypotheses, those given up having none.
-  double probability(std::size_t hypothesis) const {
-    if (given_up(hypothesis)) {
-      return 0;
-    }
-    double total = 0;
-    for (const Hypothesis& other : hypotheses_) {
-      if (other.tracker) {
-        total += std::exp(other.log_posterior() - hypotheses_[hypothesis].log_posterior());
-      }
-    }
-    return 1 / total;
-  }
+  /// Among all hypotheses and "none of these"; those given up have none.
+  double probability(std::size_t hypothesis) const { return posterior_.probability(hypothesis); }
+  double probability_of_none() const noexcept { return posterior_.probability_of_none(); }
 
-  /// The most probable one; of equals the first.
-  std::size_t best() const noexcept {
-    std::size_t best = 0;
-    for (std::size_t k = 1; k < hypotheses_.size(); ++k) {
-      const Hypothesis &a = hypotheses_[k], &b = hypotheses_[best];
-      if (a.tracker && (!b.tracker || a.log_posterior() > b.log_posterior())) {
-        best = k;
-      }
-    }
-    return best;
-  }
+  /// The most probable one; of equals the first. "None of these" does not count.
+  std::size_t best() const noexcept { return posterior_.best(); }
+
+  /// Misfits so far, and what they are worth.
+  const Posterior& posterior() const noexcept { return posterior_; }
 
   /// Throws std::invalid_argument for one that was given up.
   Tracker& tracker(std::size_t hypothesis) {
@@ -135,24 +119,23 @@ class HypothesisFilter {
   struct Hypothesis {
     std::optional<Tracker> tracker;
     FrameReport report;
-    double log_prior, log_evidence;
+    Misfit misfit;  ///< of the last frame
     double behind;  ///< the most probable one, when this one was given up [nat]
-
-    double log_posterior() const noexcept { return log_prior + log_evidence; }
   };
 
-  double log_evidence_of(const TrackerFrame& frame, const Hypothesis& hypothesis) const noexcept {
+  Misfit misfit_of(const TrackerFrame& frame, const Hypothesis& hypothesis) const noexcept {
+    Misfit misfit;
     if (!hypothesis.report.advanced()) {
-      return 0;
+      return misfit;
     }
-    double difference = 0;
     for (const CameraMask& mask : frame.masks) {
       if (hypothesis.tracker->believes(mask.camera)) {
-        difference += cells_.squared_difference(hypothesis.tracker->predicted_before(mask.camera),
-                                                hypothesis.tracker->observed(mask.camera));
+        const auto observed = cells_.shares(hypothesis.tracker->observed(mask.camera));
+        const auto predicted = cells_.shares(hypothesis.tracker->predicted_before(mask.camera));
+        misfit += {(predicted - observed).square().sum(), observed.square().sum()};
       }
     }
-    return -0.5 * difference / (settings_.cell_deviation * settings_.cell_deviation);
+    return misfit;
   }
 
   void give_up() noexcept {
@@ -162,23 +145,28 @@ class HypothesisFilter {
     if (!one_stands) {
       return;
     }
-    for (Hypothesis& each : hypotheses_) {
-      if (each.tracker && failed(each)) {
-        each.tracker.reset();
-        each.behind = std::numeric_limits<double>::infinity();
+    const auto drop = [&](std::size_t k, double behind) {
+      hypotheses_[k].tracker.reset();
+      hypotheses_[k].behind = behind;
+      posterior_.exclude(k);
+    };
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      if (hypotheses_[k].tracker && failed(hypotheses_[k])) {
+        drop(k, std::numeric_limits<double>::infinity());
       }
     }
-    const double highest = hypotheses_[best()].log_posterior();
-    for (Hypothesis& each : hypotheses_) {
-      if (each.tracker && std::exp(each.log_posterior() - highest) < settings_.least_probability) {
-        each.tracker.reset();
-        each.behind = highest - each.log_posterior();
+    const double highest = posterior_.log_posterior(best());
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      const double behind = highest - posterior_.log_posterior(k);
+      if (hypotheses_[k].tracker && std::exp(-behind) < settings_.least_probability) {
+        drop(k, behind);
       }
     }
   }
 
   Settings settings_;
   SilhouetteCells cells_;
+  Posterior posterior_;
   std::vector<Hypothesis> hypotheses_{};
 };
 
