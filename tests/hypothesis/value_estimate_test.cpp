@@ -55,6 +55,39 @@ TEST_CASE("value estimate: a value beside others that are impossible stays withi
   CHECK(estimate_value(values, two).high < 4.5);
 }
 
+TEST_CASE("value estimate: shares of a normal density, and back") {
+  std::vector<double> values, log_density;
+  for (int k = 0; k <= 20; ++k) {
+    values.push_back(k);
+    log_density.push_back(-0.5 * (k - 9.3) * (k - 9.3) / 4);
+  }
+  const ValueDensity density(values, log_density);
+  for (const double z : {-2.0, -1.0, 0.0, 0.5, 1.5}) {
+    const double share = 0.5 * std::erfc(-z / std::sqrt(2.0));
+    CHECK(density.share_below(9.3 + 2 * z) == Approx(share).margin(0.002));
+    CHECK(density.quantile(share) == Approx(9.3 + 2 * z).margin(0.02));
+  }
+  CHECK(density.share_below(-1) == 0);
+  CHECK(density.share_below(20) == 1);
+}
+
+TEST_CASE("value estimate: what is most probable at an end is in its interval") {
+  std::vector<double> values, falling, rising;
+  for (int k = 0; k <= 10; ++k) {
+    values.push_back(k);
+    falling.push_back(-k);
+    rising.push_back(k);
+  }
+  const double expected = std::log(10.0);  // an exponential density has a tenth beyond
+  const ValueEstimate empty = estimate_value(values, falling), full = estimate_value(values, rising);
+  CHECK(empty.low == 0);
+  CHECK(empty.high == Approx(expected).margin(0.02));
+  CHECK(full.high == 10);
+  CHECK(full.low == Approx(10 - expected).margin(0.02));
+  CHECK(empty.at_end);
+  CHECK(full.at_end);
+}
+
 TEST_CASE("value estimate: refuses what is no density") {
   const std::vector<double> values{1, 2}, falling{2, 1}, numbers{0, 0}, one{0}, none{};
   const std::vector<double> nowhere(2, -std::numeric_limits<double>::infinity()), broken{0, std::nan("")};

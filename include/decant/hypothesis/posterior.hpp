@@ -32,7 +32,7 @@ struct PosteriorSettings {
   /// How many independent errors a model makes in all, > 0. Differences in neighbouring cells and successive frames
   /// come from the same few errors (a pose, a delay, friction), so this is far below the number of cells, and does not
   /// grow with it.
-  double independent_errors = 30;
+  double independent_errors = 20;
   /// What a right prediction may be off by where next to nothing has been seen, in the unit of Misfit::squared, > 0.
   double least_squared = 5;
   /// A prediction that is off by more than this share of Misfit::measured is worse than "none of these", in (0, 1].
