@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// The tracking experiment of Schenck and Fox (2017) on twins of their pours: the recordings, what goes wrong between a
-/// recording and the tracker, and runs of methods on them that are kept in files, so that nothing is computed twice.
+/// The tracking experiment of Schenck and Fox (2017) on twins of their pours: what goes wrong between a recording and
+/// the tracker, and runs of methods.
 
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -16,10 +14,7 @@
 #include <mutex>
 #include <optional>
 #include <random>
-#include <stdexcept>
 #include <string>
-#include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -28,50 +23,20 @@
 #include <decant/core/image.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/force/linear_drag.hpp>
-#include <decant/io/detail/folder.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/png.hpp>
-#include <decant/io/progress.hpp>
 #include <decant/io/recording_reader.hpp>
-#include <decant/io/recording_truth.hpp>
 #include <decant/tracking/overlap.hpp>
 #include <decant/tracking/overlap_score.hpp>
 #include <decant/tracking/tracker.hpp>
 
+#include "experiment_folder.hpp"
 #include "pour_twin.hpp"
 #include "result_file.hpp"
 #include "tracking_methods.hpp"
 #include "tracking_run.hpp"
 
 namespace example {
-
-/// A recording of the experiment: its folder's name and how it is made.
-struct Pour {
-  std::string name;
-  PourTwin twin;
-};
-
-inline Pour pour(const std::string& prefix, const std::string& container, int percent, std::uint32_t seed) {
-  PourTwin twin;
-  twin.container = container;
-  twin.fill_fraction = 0.01 * percent;
-  twin.seed = seed;
-  return {prefix + container + "_" + std::to_string(percent) + "_" + std::to_string(seed), twin};
-}
-
-/// The paper's: cup and bottle, three amounts, two trials each.
-inline std::vector<Pour> paper_pours() {
-  std::vector<Pour> pours;
-  std::uint32_t seed = 0;
-  for (const char* container : {"cup", "bottle"}) {
-    for (const int percent : {30, 60, 90}) {
-      for (int trial = 0; trial < 2; ++trial) {
-        pours.push_back(pour("", container, percent, ++seed));
-      }
-    }
-  }
-  return pours;
-}
 
 /// Reality is the model's own solver at another spacing, and bodies are where they are said to be: all that is wrong
 /// is the masks' noise, from which a corrector can only do harm.
@@ -323,173 +288,40 @@ struct ExperimentOptions {
   bool again = false;                                ///< computes what is there already anew
 };
 
-/// Calls work(k) for each k from 0 to count - 1 from several threads. The first exception lets no more begin, and is
-/// thrown when all that run have ended.
-inline void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
-  const unsigned wanted =
-      threads > 0 ? static_cast<unsigned>(threads) : std::max(1U, std::thread::hardware_concurrency());
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex guard;
-  const auto loop = [&] {
-    for (std::size_t k = next++; k < count; k = next++) {
-      try {
-        work(k);
-      } catch (...) {
-        const std::lock_guard lock(guard);
-        failure = failure ? failure : std::current_exception();
-        next = count;
-      }
-    }
-  };
-  std::vector<std::thread> workers;
-  for (unsigned k = 0; k < std::min<std::size_t>(wanted, count); ++k) {
-    workers.emplace_back(loop);
-  }
-  for (std::thread& worker : workers) {
-    worker.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
-}
-
 /// Makes recordings and runs methods on them, or finds both in its folder.
 class TrackingExperiment {
  public:
   /// Throws std::runtime_error where the folder cannot be written to.
-  explicit TrackingExperiment(ExperimentOptions options) : options_(std::move(options)) {
-    decant::detail::make_folder(results_folder());
-    const std::filesystem::path probe = results_folder() / "probe.part";
-    expect_writable(probe);
-    std::filesystem::remove(probe);
-  }
+  explicit TrackingExperiment(ExperimentOptions options)
+      : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
-  /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
-  /// is there and was made otherwise.
-  void record(const std::vector<Pour>& pours) {
-    std::vector<Pour> missing;
-    for (Pour each : pours) {
+  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
+  void record(std::vector<Pour> pours) {
+    for (Pour& each : pours) {
       each.twin.spacing = options_.reality_spacing;
       each.twin.duration = options_.duration;
-      each.twin.threads = 1;
-      if (std::filesystem::exists(options_.folder / each.name)) {
-        expect_made_as(each);
-      } else {
-        missing.push_back(std::move(each));
-      }
     }
-    TogetherProgress progress("recording", missing.size());
-    // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
-    const std::filesystem::path unfinished = options_.folder / "unfinished";
-    side_by_side(missing.size(), options_.threads, [&](std::size_t k) {
-      const std::filesystem::path part = unfinished / missing[k].name;
-      decant::detail::make_folder(unfinished);
-      std::filesystem::remove_all(part);
-      record_pour(missing[k].twin, part, [&](double share) { progress.update(k, share); });
-      std::filesystem::rename(part, options_.folder / missing[k].name);
-    });
-    std::error_code not_empty;
-    std::filesystem::remove(unfinished, not_empty);
-    recorded_ += missing.size();
+    folder_.record(pours);
   }
 
   /// Runs what is not there yet; afterwards all have a result().
   void run(const std::vector<TrackingJob>& jobs) {
-    std::vector<TrackingJob> missing;
+    std::vector<ExperimentJob> all;
     for (const TrackingJob& job : jobs) {
-      const std::string key = job.key();
-      if (results_.contains(key) ||
-          std::any_of(missing.begin(), missing.end(), [&](const TrackingJob& other) { return other.key() == key; })) {
-        continue;
-      }
-      ++asked_;
-      nlohmann::json kept = options_.again ? nlohmann::json() : read_kept(key);
-      if (kept.is_object() && kept.value("settings", nlohmann::json()) == settings_json(job)) {
-        results_[key] = std::move(kept);
-      } else {
-        missing.push_back(job);
-      }
+      all.push_back(
+          {job.key(), settings_json(job), [this, job](const auto& progress) { return compute(job, progress); }});
     }
-    TogetherProgress progress("tracking", missing.size());
-    std::mutex guard;
-    side_by_side(missing.size(), options_.threads, [&](std::size_t k) {
-      nlohmann::json result = compute(missing[k], [&](double share) { progress.update(k, share); });
-      result["settings"] = settings_json(missing[k]);
-      const std::string key = missing[k].key();
-      const std::filesystem::path part = results_folder() / (key + ".json.part");
-      write_result(part, result);
-      std::filesystem::rename(part, results_folder() / (key + ".json"));
-      const std::lock_guard lock(guard);
-      results_[key] = std::move(result);
-    });
-    computed_ += missing.size();
+    folder_.run("tracking", all);
   }
 
   /// Of a job that was run; other keys are an std::out_of_range.
-  const nlohmann::json& result(const TrackingJob& job) const { return results_.at(job.key()); }
-  const std::map<std::string, nlohmann::json>& results() const { return results_; }
-  std::size_t recorded() const { return recorded_; }  ///< recordings that were made
-  std::size_t computed() const { return computed_; }  ///< results that were computed, of those asked() for
-  std::size_t asked() const { return asked_; }
+  const nlohmann::json& result(const TrackingJob& job) const { return folder_.result(job.key()); }
+  const std::map<std::string, nlohmann::json>& results() const { return folder_.results(); }
+  std::size_t recorded() const { return folder_.recorded(); }  ///< recordings that were made
+  std::size_t computed() const { return folder_.computed(); }  ///< results that were computed, of those asked() for
+  std::size_t asked() const { return folder_.asked(); }
 
  private:
-  /// One line for many jobs.
-  class TogetherProgress {
-   public:
-    TogetherProgress(const std::string& label, std::size_t jobs)
-        : line_(label, static_cast<double>(jobs)), shares_(jobs, 0.0) {}
-
-    void update(std::size_t job, double share) {
-      const std::lock_guard lock(guard_);
-      done_ += share - shares_[job];
-      finished_ += share >= 1 && shares_[job] < 1 ? 1 : 0;
-      shares_[job] = share;
-      line_.update(done_, std::to_string(finished_) + " of " + std::to_string(shares_.size()) + " done");
-    }
-
-   private:
-    std::mutex guard_;
-    decant::Progress line_;
-    std::vector<double> shares_;
-    double done_ = 0;
-    std::size_t finished_ = 0;
-  };
-
-  std::filesystem::path results_folder() const { return options_.folder / "results"; }
-
-  nlohmann::json read_kept(const std::string& key) const {
-    const std::filesystem::path file = results_folder() / (key + ".json");
-    std::error_code error;
-    return std::filesystem::is_regular_file(file, error)
-               ? nlohmann::json::parse(decant::detail::read_text_file(file, std::size_t{1} << 26), nullptr, false)
-               : nlohmann::json();
-  }
-
-  static nlohmann::json truth_of(const std::filesystem::path& folder) {
-    const std::optional<std::string> text = decant::read_truth(folder);
-    if (!text) {
-      throw std::runtime_error((folder / "recording.json").string() + ": truth is missing, which the scores need");
-    }
-    return nlohmann::json::parse(*text);
-  }
-
-  void expect_made_as(const Pour& wanted) const {
-    const std::filesystem::path folder = options_.folder / wanted.name;
-    const nlohmann::json truth = truth_of(folder);
-    const auto frames = truth.at("volume_ml").at("pan").size();
-    const auto wanted_frames = std::lround(wanted.twin.duration * wanted.twin.frames_per_second);
-    const auto words = [](const std::string& seed, double spacing_mm, auto count) {
-      return "seed " + seed + ", " + decant::detail::number_text(spacing_mm) + " mm, " + std::to_string(count) +
-             " frames";
-    };
-    const std::string is = words(truth.at("seed").dump(), truth.at("spacing_mm").get<double>(), frames);
-    const std::string should_be = words(std::to_string(wanted.twin.seed), 1e3 * wanted.twin.spacing, wanted_frames);
-    if (is != should_be) {
-      decant::detail::refuse_file(folder.string() + ": the recording that is there", should_be, is);
-    }
-  }
-
   // Forecasts double the time; of altered recordings nobody asks for them.
   std::vector<double> forecasts(const TrackingJob& job) const {
     return job.altered() || job.method == perfect_state ? std::vector<double>() : std::vector<double>{0.25, 0.5, 1};
@@ -552,8 +384,8 @@ class TrackingExperiment {
   }
 
   nlohmann::json compute(const TrackingJob& job, const std::function<void(double)>& progress) {
-    const std::filesystem::path folder = options_.folder / job.pour.name, truth_masks = folder / "truth_mask";
-    const nlohmann::json truth = truth_of(folder);
+    const std::filesystem::path folder = folder_.recording(job.pour), truth_masks = folder / "truth_mask";
+    const nlohmann::json truth = folder_.truth(job.pour);
     decant::Recording recording = decant::read_recording(folder);
     const auto frames = static_cast<double>(recording.frames);
     const auto progressed = [&](std::size_t done) { progress(static_cast<double>(done) / frames); };
@@ -571,7 +403,6 @@ class TrackingExperiment {
     const TrackingModel model = told ? model_told(truth, recording, options) : filled_model(job, recording, options);
     const TrackingResult result =
         tracking_method(told ? "open_loop" : job.method)(recording, model, options, truth_masks, progressed);
-    progress(1);  // also where a method stopped early
     nlohmann::json json = tracking_json(result, recording, options.forecasts);
     json["pixels"] = pixels_json(result.posterior);
     json["truth_iou_mean"] = number_json(result.against_truth.mean_over_frames());
@@ -609,10 +440,9 @@ class TrackingExperiment {
   }
 
   ExperimentOptions options_;
-  std::map<std::string, nlohmann::json> results_;
+  ExperimentFolder folder_;
   std::mutex models_guard_;
   std::map<std::string, std::shared_ptr<SharedModel>> models_;
-  std::size_t recorded_ = 0, computed_ = 0, asked_ = 0;
 };
 
 }  // namespace example

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What experiments on twins of pours share: their recordings and results are kept in a folder, so that nothing is
+/// computed twice, and a run that was stopped goes on where it was.
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/io/detail/folder.hpp>
+#include <decant/io/detail/text.hpp>
+#include <decant/io/progress.hpp>
+#include <decant/io/recording_truth.hpp>
+
+#include "pour_twin.hpp"
+#include "result_file.hpp"
+
+namespace example {
+
+/// A recording of the experiment: its folder's name and how it is made.
+struct Pour {
+  std::string name;
+  PourTwin twin;
+};
+
+inline Pour pour(const std::string& prefix, const std::string& container, int percent, std::uint32_t seed) {
+  PourTwin twin;
+  twin.container = container;
+  twin.fill_fraction = 0.01 * percent;
+  twin.seed = seed;
+  return {prefix + container + "_" + std::to_string(percent) + "_" + std::to_string(seed), twin};
+}
+
+/// The paper's: cup and bottle, three amounts, two trials each.
+inline std::vector<Pour> paper_pours() {
+  std::vector<Pour> pours;
+  std::uint32_t seed = 0;
+  for (const char* container : {"cup", "bottle"}) {
+    for (const int percent : {30, 60, 90}) {
+      for (int trial = 0; trial < 2; ++trial) {
+        pours.push_back(pour("", container, percent, ++seed));
+      }
+    }
+  }
+  return pours;
+}
+
+/// Calls work(k) for each k from 0 to count - 1 from several threads. The first exception lets no more begin, and is
+/// thrown when all that run have ended.
+inline void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
+  const unsigned wanted =
+      threads > 0 ? static_cast<unsigned>(threads) : std::max(1U, std::thread::hardware_concurrency());
+  std::atomic<std::size_t> next{0};
+  std::exception_ptr failure;
+  std::mutex guard;
+  const auto loop = [&] {
+    for (std::size_t k = next++; k < count; k = next++) {
+      try {
+        work(k);
+      } catch (...) {
+        const std::lock_guard lock(guard);
+        failure = failure ? failure : std::current_exception();
+        next = count;
+      }
+    }
+  };
+  std::vector<std::thread> workers;
+  for (unsigned k = 0; k < std::min<std::size_t>(wanted, count); ++k) {
+    workers.emplace_back(loop);
+  }
+  for (std::thread& worker : workers) {
+    worker.join();
+  }
+  if (failure) {
+    std::rethrow_exception(failure);
+  }
+}
+
+/// Something to be computed, and what its result depends on beside the program.
+struct ExperimentJob {
+  std::string key;  ///< of the result and its file
+  nlohmann::json settings;
+  std::function<nlohmann::json(const std::function<void(double)>& progress)> compute;
+};
+
+/// Makes recordings and computes results, or finds both in its folder.
+class ExperimentFolder {
+ public:
+  /// @param threads how many recordings or jobs are in work side by side; 0: one per core. @param again computes
+  /// results that are there already anew. Throws std::runtime_error where the folder cannot be written to.
+  ExperimentFolder(std::filesystem::path folder, int threads, bool again)
+      : folder_(std::move(folder)), threads_(threads), again_(again) {
+    decant::detail::make_folder(results_folder());
+    const std::filesystem::path probe = results_folder() / "probe.part";
+    expect_writable(probe);
+    std::filesystem::remove(probe);
+  }
+
+  std::filesystem::path recording(const Pour& pour) const { return folder_ / pour.name; }
+
+  /// What only a score may look at. Throws std::runtime_error where there is none.
+  nlohmann::json truth(const Pour& pour) const {
+    const std::optional<std::string> text = decant::read_truth(recording(pour));
+    if (!text) {
+      throw std::runtime_error((recording(pour) / "recording.json").string() +
+                               ": truth is missing, which the scores need");
+    }
+    return nlohmann::json::parse(*text);
+  }
+
+  /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
+  /// is there and was made otherwise.
+  void record(const std::vector<Pour>& pours) {
+    std::vector<Pour> missing;
+    for (Pour each : pours) {
+      each.twin.threads = 1;
+      if (std::filesystem::exists(recording(each))) {
+        expect_made_as(each);
+      } else {
+        missing.push_back(std::move(each));
+      }
+    }
+    TogetherProgress progress("recording", missing.size());
+    // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
+    const std::filesystem::path unfinished = folder_ / "unfinished";
+    side_by_side(missing.size(), threads_, [&](std::size_t k) {
+      const std::filesystem::path part = unfinished / missing[k].name;
+      decant::detail::make_folder(unfinished);
+      std::filesystem::remove_all(part);
+      record_pour(missing[k].twin, part, [&](double share) { progress.update(k, share); });
+      std::filesystem::rename(part, recording(missing[k]));
+    });
+    std::error_code not_empty;
+    std::filesystem::remove(unfinished, not_empty);
+    recorded_ += missing.size();
+  }
+
+  /// Computes what is not there yet; afterwards all have a result().
+  void run(const std::string& label, const std::vector<ExperimentJob>& jobs) {
+    std::vector<const ExperimentJob*> missing;
+    for (const ExperimentJob& job : jobs) {
+      if (results_.contains(job.key) ||
+          std::any_of(missing.begin(), missing.end(), [&](const auto* other) { return other->key == job.key; })) {
+        continue;
+      }
+      ++asked_;
+      nlohmann::json kept = again_ ? nlohmann::json() : read_kept(job.key);
+      if (kept.is_object() && kept.value("settings", nlohmann::json()) == job.settings) {
+        results_[job.key] = std::move(kept);
+      } else {
+        missing.push_back(&job);
+      }
+    }
+    TogetherProgress progress(label, missing.size());
+    std::mutex guard;
+    side_by_side(missing.size(), threads_, [&](std::size_t k) {
+      const ExperimentJob& job = *missing[k];
+      nlohmann::json result = job.compute([&](double share) { progress.update(k, share); });
+      progress.update(k, 1);  // also where it stopped early
+      result["settings"] = job.settings;
+      const std::filesystem::path part = results_folder() / (job.key + ".json.part");
+      write_result(part, result);
+      std::filesystem::rename(part, results_folder() / (job.key + ".json"));
+      const std::lock_guard lock(guard);
+      results_[job.key] = std::move(result);
+    });
+    computed_ += missing.size();
+  }
+
+  /// Of a job that was run; other keys are an std::out_of_range.
+  const nlohmann::json& result(const std::string& key) const { return results_.at(key); }
+  const std::map<std::string, nlohmann::json>& results() const { return results_; }
+  std::size_t recorded() const { return recorded_; }  ///< recordings that were made
+  std::size_t computed() const { return computed_; }  ///< results that were computed, of those asked() for
+  std::size_t asked() const { return asked_; }
+
+ private:
+  /// One line for many jobs.
+  class TogetherProgress {
+   public:
+    TogetherProgress(const std::string& label, std::size_t jobs)
+        : line_(label, static_cast<double>(jobs)), shares_(jobs, 0.0) {}
+
+    void update(std::size_t job, double share) {
+      const std::lock_guard lock(guard_);
+      done_ += share - shares_[job];
+      finished_ += share >= 1 && shares_[job] < 1 ? 1 : 0;
+      shares_[job] = share;
+      line_.update(done_, std::to_string(finished_) + " of " + std::to_string(shares_.size()) + " done");
+    }
+
+   private:
+    std::mutex guard_;
+    decant::Progress line_;
+    std::vector<double> shares_;
+    double done_ = 0;
+    std::size_t finished_ = 0;
+  };
+
+  std::filesystem::path results_folder() const { return folder_ / "results"; }
+
+  nlohmann::json read_kept(const std::string& key) const {
+    const std::filesystem::path file = results_folder() / (key + ".json");
+    std::error_code error;
+    return std::filesystem::is_regular_file(file, error)
+               ? nlohmann::json::parse(decant::detail::read_text_file(file, std::size_t{1} << 26), nullptr, false)
+               : nlohmann::json();
+  }
+
+  void expect_made_as(const Pour& wanted) const {
+    const nlohmann::json there = truth(wanted);
+    const auto frames = there.at("volume_ml").at("pan").size();
+    const auto wanted_frames = std::lround(wanted.twin.duration * wanted.twin.frames_per_second);
+    const auto words = [](const std::string& seed, double spacing_mm, auto count) {
+      return "seed " + seed + ", " + decant::detail::number_text(spacing_mm) + " mm, " + std::to_string(count) +
+             " frames";
+    };
+    const std::string is = words(there.at("seed").dump(), there.at("spacing_mm").get<double>(), frames);
+    const std::string should_be = words(std::to_string(wanted.twin.seed), 1e3 * wanted.twin.spacing, wanted_frames);
+    if (is != should_be) {
+      decant::detail::refuse_file(recording(wanted).string() + ": the recording that is there", should_be, is);
+    }
+  }
+
+  std::filesystem::path folder_;
+  int threads_;
+  bool again_;
+  std::map<std::string, nlohmann::json> results_;
+  std::size_t recorded_ = 0, computed_ = 0, asked_ = 0;
+};
+
+}  // namespace example
