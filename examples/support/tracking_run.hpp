@@ -318,6 +318,35 @@ decant::Tracker<Model, CorrectorType> tracker_for(const decant::Recording& recor
   return tracker;
 }
 
+/// A frame of a recording, with what a tracker's frame only points to.
+struct RecordedFrame {
+  std::vector<decant::TrackedPose> poses{};
+  std::vector<decant::CameraPose> cameras{};
+  std::vector<decant::Mask> seen{};
+  std::vector<decant::CameraMask> masks{};
+
+  /// @param time on the model's clock [s].
+  decant::TrackerFrame at(double time) const { return {time, poses, masks, cameras}; }
+};
+
+inline RecordedFrame frame_of(const decant::Recording& recording, std::size_t frame, const TrackingOptions& options) {
+  RecordedFrame result;
+  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+    result.poses.push_back(
+        {static_cast<decant::BodyId>(body), recording.bodies[body].motion.at(recording.timestamps[frame])});
+  }
+  result.seen.reserve(recording.cameras.size());  // masks point into it
+  for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
+    result.cameras.push_back({camera, recording.cameras[camera].view(frame).camera_from_world});
+    if (std::optional<decant::Mask> mask =
+            options.masks ? options.masks(recording, frame, camera) : recording.liquid_mask(frame, camera)) {
+      result.seen.push_back(std::move(*mask));
+      result.masks.push_back({camera, result.seen.back()});
+    }
+  }
+  return result;
+}
+
 /// Tracks the recording from beginning to end. @param follower a Tracker, or what has trackers within. @param
 /// truth_masks folder with masks that are free of noise, for scoring.
 template <class Follower>
@@ -331,25 +360,10 @@ TrackingResult track_recording(
   result.volume_ml.resize(recording.bodies.size());
   const std::vector<double> initial_ml = initial_ml_of(follower);
   const double start = recording.timestamps.front() - tracker_of(follower).model().time();
-  std::vector<TrackedPose> poses(recording.bodies.size());
   for (std::size_t frame = 0; frame < recording.frames; ++frame) {
-    const double time = recording.timestamps[frame];
-    for (std::size_t body = 0; body < poses.size(); ++body) {
-      poses[body] = {static_cast<BodyId>(body), recording.bodies[body].motion.at(time)};
-    }
-    std::vector<Mask> kept;
-    std::vector<CameraMask> masks;
-    std::vector<CameraPose> cameras;
-    kept.reserve(recording.cameras.size());
-    for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
-      cameras.push_back({camera, recording.cameras[camera].view(frame).camera_from_world});
-      if (std::optional<Mask> mask =
-              options.masks ? options.masks(recording, frame, camera) : recording.liquid_mask(frame, camera)) {
-        kept.push_back(std::move(*mask));
-        masks.push_back({camera, kept.back()});
-      }
-    }
-    const FrameReport report = follower.track({time - start, poses, masks, cameras});
+    const RecordedFrame recorded = frame_of(recording, frame, options);
+    const std::vector<CameraMask>& masks = recorded.masks;
+    const FrameReport report = follower.track(recorded.at(recording.timestamps[frame] - start));
     if (!report.advanced()) {
       result.status = std::string(to_string(report.status)) + " in frame " + std::to_string(frame);
       break;

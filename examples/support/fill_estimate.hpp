@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// How much liquid was in a container at first, judged by how it was poured out: the second experiment of Schenck and
+/// Fox (2017), at a few levels by each method, and as a quantity with an interval.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/boundary/cavity.hpp>
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/correction/map_filter_schenck2017.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/correction/silhouette_corrector.hpp>
+#include <decant/correction/warp_field_schenck2017.hpp>
+#include <decant/hypothesis/value_estimate.hpp>
+#include <decant/io/recording.hpp>
+#include <decant/simulation/fill.hpp>
+
+#include "hypothesis_run.hpp"
+
+namespace example {
+
+struct FillOptions {
+  std::vector<int> levels{0, 30, 60, 90};  ///< [% of what the container holds], those that methods choose from
+  std::vector<std::string> methods{"open_loop", "map_filter", "warp_field", "default"};
+  int grid_step = 10;  ///< [%] of the amounts between which the default method finds one
+  double confidence = 0.9;
+  double particles_in_full = 6000;  ///< where tracking.spacing is 0
+  TrackingOptions tracking{};
+  /// Amounts below this share of the best one's are given up; levels are followed to the end.
+  double least_probability = 1e-3;
+  decant::PosteriorSettings posterior{};
+};
+
+struct FillResult {
+  std::string container;
+  double container_ml = 0;
+  double spacing = 0;  ///< of the particles [m]
+  std::map<std::string, PosteriorCourse> by_method;
+  PosteriorCourse grid;                            ///< of the default method
+  std::vector<double> grid_ml;                     ///< its amounts
+  std::optional<decant::ValueEstimate> volume_ml;  ///< nothing if the recording could not be followed
+};
+
+/// The container that is meant: the one that the recording says liquid starts in, or else the first to be poured from.
+inline std::size_t container_of(const decant::Recording& recording) {
+  if (recording.liquid.initial) {
+    return recording.liquid.initial->body;
+  }
+  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+    if (recording.bodies[body].role == decant::recording::Role::Source) {
+      return body;
+    }
+  }
+  throw std::runtime_error(recording.name +
+                           ": no container: expected a body of the role 'source', or liquid.initial to name one");
+}
+
+namespace detail {
+
+inline double capacity_ml(const decant::Recording& recording, std::size_t body) {
+  const auto& container = recording.bodies[body];
+  const decant::Pose pose = container.motion.at(recording.timestamps.front());
+  const decant::Vector3<double> up =
+      pose.rotation.conjugate() * decant::Vector3<double>(-recording.gravity.normalized());
+  const decant::Cavity cavity(std::make_shared<const decant::BoundingVolumeHierarchy>(container.mesh), up);
+  if (cavity.empty()) {
+    throw std::runtime_error(recording.name + ": body '" + container.name + "' holds no liquid as it stands at first");
+  }
+  return 1e6 * cavity.volume();
+}
+
+using Weigh =
+    std::function<PosteriorCourse(const decant::Recording&, const std::vector<NamedModel>&, const TrackingOptions&,
+                                  decant::HypothesisFilterSettings, const std::function<void(double)>&)>;
+
+}  // namespace detail
+
+/// The one by which the amount is estimated.
+inline const std::string default_method = "default";
+
+/// By the names that scripts use; those of the paper are as printed.
+inline const std::vector<std::pair<std::string, detail::Weigh>>& fill_methods() {
+  static const std::vector<std::pair<std::string, detail::Weigh>> all{
+      {"open_loop", weigh<decant::OpenLoop<>>},
+      {"map_filter", weigh<decant::MapFilterSchenck2017<>>},
+      {"warp_field", weigh<decant::WarpFieldSchenck2017<>>},
+      {default_method, weigh<decant::SilhouetteCorrector<>>},
+  };
+  return all;
+}
+
+/// @param progress is told what is done, and the share of all, 0 .. 1. Throws std::runtime_error for a recording
+/// without a container, std::invalid_argument for options that make no sense.
+inline FillResult estimate_fill(const decant::Recording& told, const FillOptions& options,
+                                const std::function<void(const std::string&, double)>& progress) {
+  using namespace decant;
+  FillResult result;
+  const std::size_t container = container_of(told);
+  result.container = told.bodies[container].name;
+  result.container_ml = detail::capacity_ml(told, container);
+  // whatever it says of the amount is not used
+  Recording recording = told;
+  recording.liquid.initial = recording::Initial{container, 0.0, std::nullopt};
+  TrackingOptions tracking = options.tracking;
+  if (tracking.spacing == 0) {
+    tracking.spacing = std::cbrt(1e-6 * result.container_ml / options.particles_in_full);
+  }
+  result.spacing = tracking.spacing;
+
+  const TrackingModel empty = model_of<TrackingParts>(recording, tracking);
+  const std::set<int> levels(options.levels.begin(), options.levels.end());
+  std::set<int> grid{100};
+  for (int percent = 0; percent < 100; percent += options.grid_step) {
+    grid.insert(percent);
+  }
+  std::set<int> percents = grid;
+  percents.insert(levels.begin(), levels.end());
+  const double jobs = static_cast<double>(options.methods.size()) + 2;
+  std::map<int, TrackingModel> filled;
+  for (const int percent : percents) {
+    progress("filling", static_cast<double>(filled.size()) / static_cast<double>(percents.size()) / jobs);
+    TrackingModel& model = filled.emplace(percent, empty).first->second;
+    if (percent > 0) {
+      fill(model, static_cast<BodyId>(container), FillAmount::fraction(0.01 * percent));
+    }
+  }
+  double job = 1;
+  const auto run = [&](const std::string& method, const std::set<int>& chosen, double least_probability) {
+    const auto found = std::find_if(fill_methods().begin(), fill_methods().end(),
+                                    [&](const auto& known) { return known.first == method; });
+    expects(found != fill_methods().end(), "estimate_fill: method", "one of the known names", method);
+    std::vector<NamedModel> models;
+    for (const int percent : chosen) {
+      models.push_back({std::to_string(percent), filled.at(percent)});
+    }
+    HypothesisFilterSettings settings;
+    settings.posterior = options.posterior;
+    settings.least_probability = least_probability;
+    PosteriorCourse course = found->second(recording, models, tracking, settings,
+                                           [&](double share) { progress(method, (job + share) / jobs); });
+    ++job;
+    return course;
+  };
+  for (const std::string& method : options.methods) {
+    result.by_method[method] = run(method, levels, 0);
+  }
+  for (const int percent : grid) {
+    result.grid_ml.push_back(0.01 * percent * result.container_ml);
+  }
+  result.grid = run(default_method, grid, options.least_probability);
+  const std::vector<double> log_posterior = result.grid.last_log_posterior();
+  if (std::any_of(log_posterior.begin(), log_posterior.end(), [](double value) { return std::isfinite(value); })) {
+    result.volume_ml = estimate_value(result.grid_ml, log_posterior, options.confidence);
+  }
+  return result;
+}
+
+inline nlohmann::json fill_json(const FillResult& result, double confidence) {
+  nlohmann::json json;
+  json["container"] = result.container;
+  json["container_ml"] = result.container_ml;
+  json["spacing_mm"] = 1e3 * result.spacing;
+  json["status"] = result.grid.status;
+  for (const auto& [name, course] : result.by_method) {
+    json["posterior"][name] = posterior_json(course);
+    json["posterior_over_time"][name] = course_json(course);
+    json["evidence"][name] = evidence_json(course);
+    json["most_probable_percent"][name] =
+        course.names.empty() ? nlohmann::json() : nlohmann::json(std::stoi(course.names[course.best()]));
+  }
+  if (result.volume_ml) {
+    json["volume_ml"] = result.volume_ml->mean;
+    json["interval_" + std::to_string(std::lround(100 * confidence)) + "_ml"] = {result.volume_ml->low,
+                                                                                 result.volume_ml->high};
+    json["volume_beyond_range"] = result.volume_ml->at_end;
+  }
+  const std::vector<double> last = result.grid.last(), log_posterior = result.grid.last_log_posterior();
+  for (std::size_t k = 0; k < result.grid.names.size(); ++k) {
+    json["amounts"].push_back({{"ml", result.grid_ml[k]},
+                               {"percent", std::stoi(result.grid.names[k])},
+                               {"probability", number_json(last[k])},
+                               {"log_posterior", number_json(log_posterior[k])},
+                               {"squared_misfit", number_json(result.grid.evidence[k].before.squared)}});
+  }
+  json["none_of_these"] = number_json(last.back());
+  return json;
+}
+
+}  // namespace example

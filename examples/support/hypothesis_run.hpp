@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Weighs hypotheses about a recording against each other, frame by frame: what posterior probabilities come to over
+/// time, as JSON, and as charts and tables of a report.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/io/report.hpp>
+
+#include "result_file.hpp"
+#include "tracking_run.hpp"
+
+namespace example {
+
+/// Something that may be so, and the model as it starts if it is.
+struct NamedModel {
+  std::string name;
+  TrackingModel model;
+};
+
+/// What may speak for or against a hypothesis, over all frames that it was followed for.
+struct Evidence {
+  decant::Misfit before;           ///< of what was predicted before each frame's correction: what decides
+  double differing_before_px = 0;  ///< the same by pixels, as the paper's likelihood takes it
+  double differing_after_px = 0;   ///< after the correction
+  double moved_ml_m = 0;           ///< how much liquid was moved times how far
+  double relocated_ml = 0;         ///< taken from one place to another
+};
+
+/// What the frames of a recording said of hypotheses.
+struct PosteriorCourse {
+  static constexpr const char* none_name = "none_of_these";
+
+  std::vector<std::string> names;                  ///< of the hypotheses
+  std::vector<double> time;                        ///< of the frames [s]
+  std::vector<std::vector<double>> log_posterior;  ///< by hypothesis and frame, see HypothesisFilter [nat]
+  std::vector<double> log_none;                    ///< of "none of these", by frame
+  std::vector<Evidence> evidence;                  ///< by hypothesis
+  std::vector<Overlay> overlays;  ///< of the one that was best in each frame, where options ask for them
+  std::size_t frames_run = 0;     ///< of all hypotheses together: those given up save theirs
+  std::string status = "ok";
+
+  /// Of a hypothesis by frame; of "none of these" after the last hypothesis.
+  std::vector<std::vector<double>> probability() const {
+    std::vector<std::vector<double>> result(names.size() + 1);
+    for (std::size_t frame = 0; frame < time.size(); ++frame) {
+      double largest = log_none[frame];
+      for (const auto& of : log_posterior) {
+        largest = std::max(largest, of[frame]);
+      }
+      double total = std::exp(log_none[frame] - largest);
+      for (const auto& of : log_posterior) {
+        total += std::exp(of[frame] - largest);
+      }
+      for (std::size_t k = 0; k <= names.size(); ++k) {
+        const double own = k < names.size() ? log_posterior[k][frame] : log_none[frame];
+        result[k].push_back(std::exp(own - largest) / total);
+      }
+    }
+    return result;
+  }
+
+  /// After the last frame; of "none of these" after the last hypothesis.
+  std::vector<double> last() const {
+    std::vector<double> result;
+    for (const auto& of : probability()) {
+      result.push_back(of.empty() ? 0 : of.back());
+    }
+    return result;
+  }
+
+  std::vector<double> last_log_posterior() const {
+    std::vector<double> result;
+    for (const auto& of : log_posterior) {
+      result.push_back(of.empty() ? 0 : of.back());
+    }
+    return result;
+  }
+
+  std::size_t best() const {
+    const std::vector<double> of = last_log_posterior();
+    return static_cast<std::size_t>(std::distance(of.begin(), std::max_element(of.begin(), of.end())));
+  }
+};
+
+/// @param progress is told the share that is done, 0 .. 1.
+template <class CorrectorType>
+PosteriorCourse weigh(const decant::Recording& recording, const std::vector<NamedModel>& hypotheses,
+                      const TrackingOptions& options, decant::HypothesisFilterSettings settings,
+                      const std::function<void(double)>& progress) {
+  using namespace decant;
+  PosteriorCourse course;
+  settings.threads = {options.threads};
+  TrackingOptions each = options;
+  each.threads = 1;  // simulations run side by side
+  HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings);
+  for (const NamedModel& hypothesis : hypotheses) {
+    course.names.push_back(hypothesis.name);
+    filter.add(tracker_for(recording, hypothesis.model, CorrectorType(), each));
+  }
+  course.log_posterior.resize(hypotheses.size());
+  course.evidence.resize(hypotheses.size());
+  const double start = recording.timestamps.front() - (hypotheses.empty() ? 0 : hypotheses.front().model.time());
+  for (std::size_t frame = 0; frame < recording.frames; ++frame) {
+    const RecordedFrame recorded = frame_of(recording, frame, options);
+    course.frames_run += filter.running();
+    const FrameReport report = filter.track(recorded.at(recording.timestamps[frame] - start));
+    if (!report.advanced()) {
+      course.status = std::string(to_string(report.status)) + " in frame " + std::to_string(frame);
+      break;
+    }
+    course.time.push_back(recording.timestamps[frame]);
+    for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+      course.log_posterior[k].push_back(filter.log_posterior(k));
+      if (!filter.given_up(k)) {
+        const FrameReport& own = filter.report(k);
+        Evidence& evidence = course.evidence[k];
+        evidence.before = filter.posterior().misfit(k);
+        evidence.differing_before_px += static_cast<double>(own.prior.differing_px());
+        evidence.differing_after_px += static_cast<double>(own.posterior.differing_px());
+        const double particle_ml = 1e6 * std::pow(filter.tracker(k).model().spacing(), 3);
+        evidence.moved_ml_m += particle_ml * static_cast<double>(own.correction.moved) * own.correction.mean_shift;
+        evidence.relocated_ml += 1e6 * own.relocated_volume;
+      }
+    }
+    course.log_none.push_back(filter.posterior().log_posterior_of_none());
+    if (options.keep_overlays && !recording.cameras.empty()) {
+      const auto& tracker = filter.tracker(filter.best());
+      const bool has_mask = !recorded.masks.empty() && recorded.masks.front().camera == 0;
+      course.overlays.push_back(overlay_of(tracker.predicted(0), has_mask ? &tracker.observed(0) : nullptr));
+    }
+    progress(static_cast<double>(frame + 1) / static_cast<double>(recording.frames));
+  }
+  return course;
+}
+
+/// The last frame's probabilities, by name.
+inline nlohmann::json posterior_json(const PosteriorCourse& course) {
+  nlohmann::json json;
+  const std::vector<double> last = course.last();
+  for (std::size_t k = 0; k < course.names.size(); ++k) {
+    json[course.names[k]] = number_json(last[k]);
+  }
+  json[PosteriorCourse::none_name] = number_json(last.back());
+  return json;
+}
+
+inline nlohmann::json evidence_json(const PosteriorCourse& course) {
+  nlohmann::json json;
+  for (std::size_t k = 0; k < course.names.size(); ++k) {
+    const Evidence& of = course.evidence[k];
+    json[course.names[k]] = {
+        {"squared_before", number_json(of.before.squared)}, {"measured", number_json(of.before.measured)},
+        {"differing_before_px", of.differing_before_px},    {"differing_after_px", of.differing_after_px},
+        {"moved_ml_m", number_json(of.moved_ml_m)},         {"relocated_ml", number_json(of.relocated_ml)}};
+  }
+  return json;
+}
+
+inline nlohmann::json course_json(const PosteriorCourse& course) {
+  nlohmann::json json;
+  json["time_s"] = column_json(course.time);
+  const std::vector<std::vector<double>> probability = course.probability();
+  for (std::size_t k = 0; k < course.names.size(); ++k) {
+    json[course.names[k]] = column_json(probability[k]);
+  }
+  json[PosteriorCourse::none_name] = column_json(probability.back());
+  return json;
+}
+
+inline decant::LineChart course_chart(const std::string& title, const PosteriorCourse& course) {
+  decant::LineChart chart{title, "time [s]", "probability", {}, {}, {0, 1}};
+  const std::vector<std::vector<double>> probability = course.probability();
+  for (std::size_t k = 0; k < course.names.size(); ++k) {
+    chart.lines.push_back({course.names[k], course.time, probability[k]});
+  }
+  chart.lines.push_back({"none of these", course.time, probability.back(), true});
+  return chart;
+}
+
+}  // namespace example
