@@ -58,7 +58,7 @@ std::string sentence(const example::FillResult& result) {
     return result.container + ": the amount could not be estimated: " + result.grid.status;
   }
   const auto& volume = *result.volume_ml;
-  return result.container + ": " + fixed_text(volume.mean, 0) + " ml (90 %: " + fixed_text(volume.low, 0) + " .. " +
+  return result.container + ": " + fixed_text(volume.median, 0) + " ml (90 %: " + fixed_text(volume.low, 0) + " .. " +
          fixed_text(volume.high, 0) + ") of " + fixed_text(result.container_ml, 0) + " ml that it holds";
 }
 
@@ -93,6 +93,7 @@ int main(int count, char** values) {
   options.tracking.spacing = 0;
   double spacing_mm = 0;
   CLI::App app("Estimates how much liquid was in the container that a recording shows being poured from.");
+  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("recording", folder, "folder of a recording, format version 1; what it says of the amount is not used")
       ->required();
   app.add_option("--json", json_file, "writes the posterior and the amount");

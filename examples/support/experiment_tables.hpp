@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <filesystem>
 #include <functional>
 #include <limits>
 #include <optional>

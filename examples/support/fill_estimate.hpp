@@ -183,7 +183,7 @@ inline nlohmann::json fill_json(const FillResult& result, double confidence) {
         course.names.empty() ? nlohmann::json() : nlohmann::json(std::stoi(course.names[course.best()]));
   }
   if (result.volume_ml) {
-    json["volume_ml"] = result.volume_ml->mean;
+    json["volume_ml"] = result.volume_ml->median;
     json["interval_" + std::to_string(std::lround(100 * confidence)) + "_ml"] = {result.volume_ml->low,
                                                                                  result.volume_ml->high};
     json["volume_beyond_range"] = result.volume_ml->at_end;

@@ -84,6 +84,22 @@ TEST_CASE("posterior: none of these, if all are far from what was measured") {
   CHECK(sum_of(seen({900, 950}, 1000, certain)) == Approx(1));
 }
 
+TEST_CASE("posterior: nothing was there, and one hypothesis had said so") {
+  const auto empty = seen({0, 400, 800, 1200}, 0);
+  CHECK(empty.probability(0) > 0.999);
+  // where all said so, or nothing was to be seen, nothing is known about none of these
+  CHECK(seen({0, 0}, 0).probability_of_none() == Approx(PosteriorSettings{}.none_prior));
+  // what others had predicted until they were given up still counts
+  auto pruned = seen({0, 400, 800, 1200}, 0);
+  pruned.exclude(2);
+  pruned.exclude(3);
+  CHECK(pruned.log_posterior_of_none() == empty.log_posterior_of_none());
+  // nor can an excluded one that broke spoil it
+  auto broken = seen({100, std::numeric_limits<double>::quiet_NaN()}, 1000);
+  CHECK(broken.log_posterior_of_none() < 0);
+  CHECK(sum_of(broken) == Approx(1));
+}
+
 TEST_CASE("posterior: ten thousand frames neither underflow nor forget") {
   Posterior posterior;
   posterior.add();

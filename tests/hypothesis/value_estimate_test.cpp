@@ -20,6 +20,7 @@ TEST_CASE("value estimate: a normal density, known at values a deviation apart")
     INFO(center);
     const ValueEstimate estimate = estimate_value(values, log_density, 0.9);
     CHECK(estimate.mean == Approx(center).margin(0.01));
+    CHECK(estimate.median == Approx(center).margin(0.01));
     CHECK(estimate.low == Approx(center - 1.6449).margin(0.01));  // of the normal distribution
     CHECK(estimate.high == Approx(center + 1.6449).margin(0.01));
     CHECK_FALSE(estimate.at_end);
@@ -81,6 +82,8 @@ TEST_CASE("value estimate: what is most probable at an end is in its interval") 
   const double expected = std::log(10.0);  // an exponential density has a tenth beyond
   const ValueEstimate empty = estimate_value(values, falling), full = estimate_value(values, rising);
   CHECK(empty.low == 0);
+  CHECK(empty.median == Approx(std::log(2.0)).margin(0.02));
+  CHECK(empty.mean == Approx(1).margin(0.02));
   CHECK(empty.high == Approx(expected).margin(0.02));
   CHECK(full.high == 10);
   CHECK(full.low == Approx(10 - expected).margin(0.02));

@@ -16,6 +16,15 @@ function(run status)
   set(errors "${errors}" PARENT_SCOPE)
 endfunction()
 
+# record(ARGUMENTS...): makes the recording `pour` in SCRATCH.
+function(record)
+  execute_process(COMMAND "${RECORD}" ${ARGN} --out pour WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result
+                  OUTPUT_VARIABLE output ERROR_VARIABLE errors)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "record_pour failed: ${output}\n${errors}")
+  endif()
+endfunction()
+
 # A refusal is one line that names what is wrong.
 function(expect_one_line text part)
   string(STRIP "${text}" text)
@@ -146,11 +155,7 @@ printf ' \"measured_peak_mm\": 10.0,\\n \"peak_mm\": %s\\n}\\n' $peak >>\"$json\
 
 elseif(CASE STREQUAL "track_scores_a_recording")
   # coarse, 90 % full and short: that both tools work together; how well it tracks is for the benchmark
-  execute_process(COMMAND "${RECORD}" --container cup --fill 0.9 --seed 3 --spacing-mm 7 --seconds 1.6 --out pour
-                  WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "record_pour failed: ${output}\n${errors}")
-  endif()
+  record(--container cup --fill 0.9 --seed 3 --spacing-mm 7 --seconds 1.6)
   run(0 pour --corrector open_loop,map_filter,warp_field,default --spacing-mm 8 --json out.json --report out.html)
   foreach(name IN ITEMS open_loop map_filter warp_field default)
     expect_keys("${SCRATCH}/out.json" correctors.${name}.iou_mean correctors.${name}.iou_pooled
@@ -172,12 +177,7 @@ elseif(CASE STREQUAL "track_scores_a_recording")
 
 elseif(CASE STREQUAL "track_estimates_what_it_is_not_told")
   # coarse and short, nothing hidden, and told the right amount: the estimate may not lead away from it
-  execute_process(COMMAND "${RECORD}" --container cup --fill 0.6 --seed 3 --spacing-mm 7 --seconds 1.8 --nothing-hidden
-                          --out pour
-                  WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "record_pour failed: ${output}\n${errors}")
-  endif()
+  record(--container cup --fill 0.6 --seed 3 --spacing-mm 7 --seconds 1.8 --nothing-hidden)
   run(0 pour --corrector default_adapting,default_amounts --spacing-mm 8 --no-forecasts --json out.json)
   if(NOT output MATCHES "at first [0-9]+ ml" OR NOT output MATCHES "pose_delay_s")
     message(FATAL_ERROR "the estimates are not told:\n${output}")
@@ -219,12 +219,7 @@ elseif(CASE STREQUAL "track_refuses_a_bad_recording")
   expect_one_line("${errors}" "the same in every frame")
 
 elseif(CASE STREQUAL "estimate_fill_is_not_told_the_amount")
-  execute_process(COMMAND "${RECORD}" --container cup --fill 0.6 --seed 3 --spacing-mm 7 --seconds 1.8 --nothing-hidden
-                          --out pour
-                  WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result OUTPUT_VARIABLE output ERROR_VARIABLE errors)
-  if(NOT result EQUAL 0)
-    message(FATAL_ERROR "record_pour failed: ${output}\n${errors}")
-  endif()
+  record(--container cup --fill 0.6 --seed 3 --spacing-mm 7 --seconds 1.8 --nothing-hidden)
   # what the recording says of the amount is a lie, and the truth is away
   file(READ "${SCRATCH}/pour/recording.json" recording)
   string(JSON true_ml GET "${recording}" truth initial_ml)
@@ -258,7 +253,9 @@ elseif(CASE STREQUAL "estimate_fill_refuses")
   run(2 missing --json out.json)
   expect_one_line("${errors}" "missing")
   run(2 "${SOURCE}/examples/data/pour_cup" --methods magic)
+  expect_one_line("${errors}" "--methods.*magic")
   run(2 "${SOURCE}/examples/data/pour_cup" --levels 30,130)
+  expect_one_line("${errors}" "--levels.*130")
   run(2 "${SOURCE}/examples/data/pour_cup" --json nowhere/out.json)
   expect_one_line("${errors}" "nowhere/out.json")
   # no body that liquid could start in

@@ -35,7 +35,7 @@ struct PosteriorSettings {
   double independent_errors = 20;
   /// What a right prediction may be off by where next to nothing has been seen, in the unit of Misfit::squared, > 0.
   double least_squared = 5;
-  /// A prediction that is off by more than this share of Misfit::measured is worse than "none of these", in (0, 1].
+  /// A prediction that is off by more than this share of the liquid in play is worse than "none of these", in (0, 1].
   double hopeless_share = 0.6;
   /// Of "none of these" before anything is seen, in [0, 1); 0: one of the hypotheses is right.
   double none_prior = 0.05;
@@ -95,17 +95,15 @@ class Posterior {
     const Hypothesis& one = hypotheses_.at(hypothesis);
     return one.excluded ? -std::numeric_limits<double>::infinity() : one.log_prior + log_likelihood(one.misfit.squared);
   }
-  /// The same for "none of these", which is taken to predict what hopeless_share says; -infinity if it has no prior.
+  /// The same for "none of these", which is taken to be off by hopeless_share of the liquid in play: of what was
+  /// measured or, where hypotheses are off by more than all of that, of what they are off by on average (an empty
+  /// container, beside one hypothesis that says so and others that predicted liquid). -infinity if it has no prior.
   double log_posterior_of_none() const noexcept {
     if (settings_.none_prior == 0) {
       return -std::numeric_limits<double>::infinity();
     }
-    double measured = 0;
-    for (const Hypothesis& one : hypotheses_) {
-      measured = std::max(measured, one.excluded ? 0.0 : one.misfit.measured);
-    }
     const double odds = settings_.none_prior / (1 - settings_.none_prior);
-    return std::log(odds) + total_log_prior() + log_likelihood(settings_.hopeless_share * measured);
+    return std::log(odds) + total_log_prior() + log_likelihood(settings_.hopeless_share * in_play());
   }
 
   double probability(std::size_t hypothesis) const {
@@ -138,6 +136,21 @@ class Posterior {
     bool excluded;
   };
 
+  // One that was excluded has what it had until then, so that giving up hypotheses does not help "none of these".
+  double in_play() const noexcept {
+    double measured = 0, total = 0;
+    std::size_t count = 0;
+    for (const Hypothesis& one : hypotheses_) {
+      measured = std::max(measured, std::isfinite(one.misfit.measured) ? one.misfit.measured : 0.0);
+    }
+    for (const Hypothesis& one : hypotheses_) {
+      if (std::isfinite(one.misfit.squared)) {
+        total += std::max(measured, one.misfit.squared);
+        ++count;
+      }
+    }
+    return count > 0 ? total / static_cast<double>(count) : measured;
+  }
   // Priors are up to a constant: "none of these" has its share of what they come to.
   double total_log_prior() const noexcept {
     double total = 0;

@@ -19,6 +19,7 @@ namespace decant::inline DECANT_TARGET {
 /// What is known of a quantity, in its unit.
 struct ValueEstimate {
   double mean = 0;
+  double median = 0;  ///< always within the interval; little that is far away moves it less than the mean
   /// Interval of the confidence asked for: central, or, where the density is highest at an end (an empty container),
   /// from there on.
   double low = 0, high = 0;
@@ -158,14 +159,14 @@ class ValueDensity {
   double mean_ = 0;
 };
 
-/// Mean and interval of a ValueDensity. @param confidence in (0, 1). Throws std::invalid_argument as that does, and for
+/// Mean, median and interval of a ValueDensity. @param confidence in (0, 1). Throws std::invalid_argument as that does, and for
 /// another confidence.
 inline ValueEstimate estimate_value(std::span<const double> values, std::span<const double> log_density,
                                     double confidence = 0.9) {
   expects(confidence > 0 && confidence < 1, "estimate_value: confidence", "in (0, 1)", confidence);
   const ValueDensity density(values, log_density);
   const auto [low, high] = density.interval(confidence);
-  return {density.mean(), low, high, density.near_end(low, high)};
+  return {density.mean(), density.quantile(0.5), low, high, density.near_end(low, high)};
 }
 
 }  // namespace decant::inline DECANT_TARGET
