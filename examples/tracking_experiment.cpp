@@ -120,7 +120,7 @@ std::vector<example::ExperimentSection> sections_of(const std::string& set, cons
                   : set == "wrong_amount" ? example::amount_tables(experiment, plan.pours, plan.methods)
                   : set == "sweep"        ? example::sweep_tables(experiment, plan.pours, plan.methods, plan.conditions)
                                           : example::pour_tables(experiment, plan.pours, plan.methods);
-  for (auto& section : example::detail::failures_of(experiment)) {
+  for (auto& section : example::failures_of(experiment.results())) {
     sections.push_back(std::move(section));
   }
   return sections;

@@ -7,8 +7,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -25,6 +27,7 @@ struct ExperimentSection {
   decant::HtmlReport::TableLook look{};
   std::string note{};
   std::optional<decant::LineChart> chart{};
+  std::optional<decant::BarChart> bars{};
   nlohmann::json json{};  ///< figures for scripts, beside the table's cells
 };
 
@@ -51,6 +54,20 @@ inline double mean_of(const std::vector<double>& values) {
 }
 
 }  // namespace detail
+
+/// What did not run to its end; its scores are of the frames before. Nothing if all did.
+inline std::vector<ExperimentSection> failures_of(const std::map<std::string, nlohmann::json>& results) {
+  decant::Table table({"job", "status"});
+  for (const auto& [key, result] : results) {
+    if (const std::string status = result.at("status"); status != "ok") {
+      table.add({key, status});
+    }
+  }
+  if (table.rows().size() == 1) {
+    return {};
+  }
+  return {{"Stopped early", std::move(table), {}, "Scores of these are of the frames before."}};
+}
 
 inline void print_sections(const std::vector<ExperimentSection>& sections) {
   for (const ExperimentSection& section : sections) {
@@ -80,6 +97,9 @@ inline void write_experiment_report(const std::filesystem::path& path, const std
     }
     if (section.chart) {
       report.chart(*section.chart);
+    }
+    if (section.bars) {
+      report.bar_chart(*section.bars);
     }
   }
   report.write(path);

@@ -90,20 +90,6 @@ inline Results results_of(const TrackingExperiment& experiment, const std::vecto
   return results;
 }
 
-/// What did not run to its end; its scores are of the frames before.
-inline std::vector<ExperimentSection> failures_of(const TrackingExperiment& experiment) {
-  decant::Table table({"job", "status"});
-  for (const auto& [key, result] : experiment.results()) {
-    if (const std::string status = result.at("status"); status != "ok") {
-      table.add({key, status});
-    }
-  }
-  if (table.rows().size() == 1) {
-    return {};
-  }
-  return {{"Stopped early", std::move(table), {}, "Scores of these are of the frames before."}};
-}
-
 }  // namespace detail
 
 /// What the paper prints for a method, overall, in percent, or NaN.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <decant/hypothesis/value_estimate.hpp>
@@ -89,6 +90,19 @@ TEST_CASE("value estimate: what is most probable at an end is in its interval") 
   CHECK(full.low == Approx(10 - expected).margin(0.02));
   CHECK(empty.at_end);
   CHECK(full.at_end);
+}
+
+TEST_CASE("value estimate: an interval reaches the end also where the density is flat there") {
+  std::vector<double> values, log_density;
+  for (int k = 0; k <= 20; ++k) {
+    values.push_back(k);
+    log_density.push_back(-0.5 * k * k / 9.0);  // half of a normal density of deviation 3
+  }
+  for (const auto& [confidence, deviations] : {std::pair(0.5, 0.6745), {0.9, 1.6449}, {0.95, 1.96}, {0.99, 2.5758}}) {
+    const ValueEstimate estimate = estimate_value(values, log_density, confidence);
+    CHECK(estimate.low == 0);
+    CHECK(estimate.high == Approx(3 * deviations).margin(0.05));
+  }
 }
 
 TEST_CASE("value estimate: refuses what is no density") {

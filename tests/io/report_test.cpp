@@ -53,6 +53,23 @@ TEST_CASE("report: a thinned line keeps its highest and lowest points and its ga
   CHECK(std::is_sorted(thin.x.begin(), thin.x.end()));
 }
 
+TEST_CASE("report: bars stand on zero, as high as their numbers") {
+  const decant::BarChart chart{
+      "title", "level", "share", {"a<", "b"}, {{"first", {0.5, 1}}, {"second", {-0.5, std::nan("")}}}, {}};
+  const std::string svg = decant::detail::bar_chart_svg(chart);
+  // the axis has -0.5 .. 1 over 14 .. 310 - 48: 165.33 px for 1, zero at 179.3
+  CHECK(svg.find("y=\"96.7\" width=\"146.1\" height=\"82.7\"") != std::string::npos);
+  CHECK(svg.find("y=\"179.3\" width=\"146.1\" height=\"82.7\"") != std::string::npos);
+  CHECK(svg.find("y=\"14.0\" width=\"146.1\" height=\"165.3\"") != std::string::npos);
+  CHECK(svg.find(">a&lt;</text>") != std::string::npos);
+  CHECK(svg.find("nan") == std::string::npos);
+  decant::HtmlReport report("bars");
+  report.bar_chart(chart);
+  CHECK(report.text().find("</i>second</span>") != std::string::npos);
+  CHECK_THROWS_WITH(report.bar_chart({"t", "x", "y", {"a"}, {{"n", {}}}, {}}),
+                    decant_test::contains("number of heights"));
+}
+
 TEST_CASE("report: a chart draws each point where it belongs") {
   const decant::LineChart chart{
       "t",

@@ -65,9 +65,9 @@ class ValueDensity {
     const double tail = 0.5 * (1 - share);
     const std::pair<double, double> central{quantile(tail), quantile(1 - tail)};
     const double at_front = density_near(values_.front()), at_back = density_near(values_.back());
-    const double inside = std::max(density_near(central.first), density_near(central.second));
+    const double at_end = std::max(at_front, at_back);
     constexpr double clearly = 1.001;  // an even density has no highest place
-    if (std::max(at_front, at_back) < clearly * std::max(inside, density_near(quantile(0.5)))) {
+    if (clearly * at_end < highest() || at_end < clearly * density_near(quantile(0.5))) {
       return central;
     }
     return at_front > at_back ? std::pair(values_.front(), quantile(share))
@@ -109,6 +109,15 @@ class ValueDensity {
     const double u = std::clamp((value - values_[gap]) / width, 0.0, 1.0);
     const std::size_t piece = pieces * gap + std::min(static_cast<std::size_t>(u * pieces), std::size_t{pieces - 1});
     return (below_[piece] - (piece > 0 ? below_[piece - 1] : 0.0)) / width;
+  }
+
+  double highest() const noexcept {
+    double highest = 0;
+    for (std::size_t piece = 0; piece < below_.size(); ++piece) {
+      const double width = values_[piece / pieces + 1] - values_[piece / pieces];
+      highest = std::max(highest, (below_[piece] - (piece > 0 ? below_[piece - 1] : 0.0)) / width);
+    }
+    return highest;
   }
 
   double middle(std::size_t piece) const noexcept {
@@ -159,8 +168,8 @@ class ValueDensity {
   double mean_ = 0;
 };
 
-/// Mean, median and interval of a ValueDensity. @param confidence in (0, 1). Throws std::invalid_argument as that does, and for
-/// another confidence.
+/// Mean, median and interval of a ValueDensity. @param confidence in (0, 1). Throws std::invalid_argument as that does,
+/// and for another confidence.
 inline ValueEstimate estimate_value(std::span<const double> values, std::span<const double> log_density,
                                     double confidence = 0.9) {
   expects(confidence > 0 && confidence < 1, "estimate_value: confidence", "in (0, 1)", confidence);

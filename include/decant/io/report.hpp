@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// A report in one HTML file that needs no network: text, tables, line charts, pictures and a film to scrub through.
+/// A report in one HTML file that needs no network: text, tables, charts, pictures and a film to scrub through.
 
 #include <algorithm>
 #include <array>
@@ -37,6 +37,21 @@ struct LineChart {
   std::vector<Line> lines;
   std::vector<double> x_within{};  ///< numbers that the axis shows in any case, such as where a film begins and ends
   std::vector<double> y_within{};  ///< likewise, such as 0 and 1 for a share
+};
+
+/// Groups of bars that stand on a common axis.
+struct BarChart {
+  struct Bars {
+    std::string name;
+    std::vector<double> heights;  ///< one per group; there is no bar where a number is not finite
+  };
+
+  std::string title;
+  std::string x_label;  ///< of what groups differ in
+  std::string y_label;  ///< with unit
+  std::vector<std::string> groups;
+  std::vector<Bars> bars;          ///< in each group in this order
+  std::vector<double> y_within{};  ///< numbers that the axis shows in any case, beside 0
 };
 
 namespace detail {
@@ -168,13 +183,17 @@ inline LineChart::Line thinned(const LineChart::Line& line, std::size_t bins) {
   return out;
 }
 
-/// Colour and dashes of a chart's n-th line. The colours are those of Okabe and Ito (2008), which also those tell apart
-/// who do not see red against green; their yellow is left out, which is faint on white.
-inline std::string line_style(const LineChart& chart, std::size_t n) {
+/// Of a chart's n-th series. The colours are those of Okabe and Ito (2008), which also those tell apart who do not see
+/// red against green; their yellow is left out, which is faint on white.
+inline const char* series_color(std::size_t n) {
   constexpr std::array<const char*, 7> colors = {"#0072b2", "#e69f00", "#009e73", "#cc79a7",
                                                  "#1c232b", "#56b4e9", "#d55e00"};
+  return colors[n % colors.size()];
+}
+
+inline std::string line_style(const LineChart& chart, std::size_t n) {
   const LineChart::Line& line = chart.lines[n];
-  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + colors[n % colors.size()] + "\"" +
+  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + series_color(n) + "\"" +
          (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
 }
 
@@ -188,6 +207,15 @@ inline std::string chart_legend(const LineChart& chart) {
   return out + "</div>\n";
 }
 
+inline std::string bar_chart_legend(const BarChart& chart) {
+  std::string out = "<div class=\"legend\">";
+  for (std::size_t n = 0; n < chart.bars.size(); ++n) {
+    out += std::string("<span><i style=\"background:") + series_color(n) + "\"></i>" + html_text(chart.bars[n].name) +
+           "</span>";
+  }
+  return out + "</div>\n";
+}
+
 /// A drawing's size and how close its labels stand. A chart is drawn twice, since the letters of a wide one shrink too
 /// much on a telephone.
 struct ChartShape {
@@ -197,6 +225,75 @@ struct ChartShape {
 };
 inline constexpr ChartShape wide_chart{"wide", 880, 310, 70, 16, 14, 48, 10, 6};
 inline constexpr ChartShape narrow_chart{"narrow", 360, 270, 54, 8, 12, 46, 5, 5};
+
+/// What all charts have: the vertical axis with its grid, and the names of both axes.
+struct ChartFrame {
+  ChartShape shape;
+  Ticks y_ticks;
+
+  static std::string point(double value) { return fixed_text(value, 1); }
+  double y_at(double y) const {
+    return shape.height - shape.bottom -
+           (y - y_ticks.first) / (y_ticks.last - y_ticks.first) * (shape.height - shape.top - shape.bottom);
+  }
+
+  std::string begin(const std::string& title, const std::string& attributes) const {
+    std::string svg = std::string("<svg class=\"chart ") + shape.kind + "\" viewBox=\"0 0 " +
+                      fixed_text(shape.width, 0) + " " + fixed_text(shape.height, 0) + "\" role=\"img\" aria-label=\"" +
+                      html_text(title) + "\"" + attributes + ">\n";
+    for (const double y : y_ticks.values()) {
+      svg += "<line class=\"" + std::string(std::abs(y) < 1e-9 * y_ticks.step ? "zero" : "grid") + "\" x1=\"" +
+             point(shape.left) + "\" x2=\"" + point(shape.width - shape.right) + "\" y1=\"" + point(y_at(y)) +
+             "\" y2=\"" + point(y_at(y)) + "\"/><text text-anchor=\"end\" x=\"" + point(shape.left - 8) + "\" y=\"" +
+             point(y_at(y) + 4) + "\">" + y_ticks.text(y) + "</text>\n";
+    }
+    return svg;
+  }
+
+  std::string below(double x, const std::string& text) const {
+    return "<text text-anchor=\"middle\" x=\"" + point(x) + "\" y=\"" + point(shape.height - shape.bottom + 18) +
+           "\">" + html_text(text) + "</text>\n";
+  }
+
+  std::string names(const std::string& x_label, const std::string& y_label) const {
+    return "<text text-anchor=\"middle\" x=\"" + point((shape.left + shape.width - shape.right) / 2) + "\" y=\"" +
+           point(shape.height - 8) + "\">" + html_text(x_label) +
+           "</text>\n<text text-anchor=\"middle\" transform=\"translate(16," +
+           point((shape.top + shape.height - shape.bottom) / 2) + ") rotate(-90)\">" + html_text(y_label) + "</text>\n";
+  }
+};
+
+inline std::string bar_chart_svg(const BarChart& chart, const ChartShape& shape = wide_chart) {
+  double low = 0, high = 0;
+  const auto include = [&](double y) {
+    low = std::isfinite(y) ? std::min(low, y) : low;
+    high = std::isfinite(y) ? std::max(high, y) : high;
+  };
+  for (const BarChart::Bars& bars : chart.bars) {
+    std::for_each(bars.heights.begin(), bars.heights.end(), include);
+  }
+  std::for_each(chart.y_within.begin(), chart.y_within.end(), include);
+  const ChartFrame frame{shape, Ticks(low, high, shape.y_ticks)};
+  const auto point = ChartFrame::point;
+  std::string svg = frame.begin(chart.title, "");
+  const double group_width =
+      (shape.width - shape.left - shape.right) / static_cast<double>(std::max<std::size_t>(1, chart.groups.size()));
+  const double bar_width = 0.8 * group_width / static_cast<double>(std::max<std::size_t>(1, chart.bars.size()));
+  for (std::size_t group = 0; group < chart.groups.size(); ++group) {
+    const double begin = shape.left + static_cast<double>(group) * group_width;
+    svg += frame.below(begin + 0.5 * group_width, chart.groups[group]);
+    for (std::size_t n = 0; n < chart.bars.size(); ++n) {
+      const double height = chart.bars[n].heights[group];
+      if (std::isfinite(height)) {
+        const double from = frame.y_at(std::max(0.0, height)), to = frame.y_at(std::min(0.0, height));
+        svg += "<rect fill=\"" + std::string(series_color(n)) + "\" x=\"" +
+               point(begin + 0.1 * group_width + static_cast<double>(n) * bar_width) + "\" y=\"" + point(from) +
+               "\" width=\"" + point(0.92 * bar_width) + "\" height=\"" + point(to - from) + "\"/>\n";
+      }
+    }
+  }
+  return svg + frame.names(chart.x_label, chart.y_label) + "</svg>\n";
+}
 
 inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = wide_chart) {
   const double width = shape.width, height = shape.height, left = shape.left, right = shape.right, top = shape.top,
@@ -220,37 +317,24 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
     y_low = std::isfinite(y) ? std::min(y_low, y) : y_low;
     y_high = std::isfinite(y) ? std::max(y_high, y) : y_high;
   }
-  const Ticks x_ticks(x_low, x_high, shape.x_ticks), y_ticks(y_low, y_high, shape.y_ticks);
+  const Ticks x_ticks(x_low, x_high, shape.x_ticks);
+  const ChartFrame frame{shape, Ticks(y_low, y_high, shape.y_ticks)};
   if (!(x_high > x_low)) {
     x_low = x_ticks.first;
     x_high = x_ticks.last;
   }
   const auto x_at = [&](double x) { return left + (x - x_low) / (x_high - x_low) * (width - left - right); };
-  const auto y_at = [&](double y) {
-    return height - bottom - (y - y_ticks.first) / (y_ticks.last - y_ticks.first) * (height - top - bottom);
-  };
-  const auto point = [](double value) { return fixed_text(value, 1); };
-
-  std::string svg = std::string("<svg class=\"chart ") + shape.kind + "\" viewBox=\"0 0 " + fixed_text(width, 0) + " " +
-                    fixed_text(height, 0) + "\" role=\"img\" aria-label=\"" + html_text(chart.title) +
-                    "\" data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
-                    "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\">\n";
-  for (const double y : y_ticks.values()) {
-    svg += "<line class=\"" + std::string(std::abs(y) < 1e-9 * y_ticks.step ? "zero" : "grid") + "\" x1=\"" +
-           point(left) + "\" x2=\"" + point(width - right) + "\" y1=\"" + point(y_at(y)) + "\" y2=\"" + point(y_at(y)) +
-           "\"/><text text-anchor=\"end\" x=\"" + point(left - 8) + "\" y=\"" + point(y_at(y) + 4) + "\">" +
-           y_ticks.text(y) + "</text>\n";
-  }
+  const auto point = ChartFrame::point;
+  std::string svg =
+      frame.begin(chart.title, " data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
+                                   "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\"");
   for (const double x : x_ticks.values()) {
     if (x >= x_low - 1e-9 * x_ticks.step && x <= x_high + 1e-9 * x_ticks.step) {
       svg += "<line class=\"grid\" x1=\"" + point(x_at(x)) + "\" x2=\"" + point(x_at(x)) + "\" y1=\"" + point(top) +
-             "\" y2=\"" + point(height - bottom) + "\"/><text text-anchor=\"middle\" x=\"" + point(x_at(x)) +
-             "\" y=\"" + point(height - bottom + 18) + "\">" + x_ticks.text(x) + "</text>\n";
+             "\" y2=\"" + point(height - bottom) + "\"/>" + frame.below(x_at(x), x_ticks.text(x));
     }
   }
-  svg += "<text text-anchor=\"middle\" x=\"" + point((left + width - right) / 2) + "\" y=\"" + point(height - 8) +
-         "\">" + html_text(chart.x_label) + "</text>\n<text text-anchor=\"middle\" transform=\"translate(16," +
-         point((top + height - bottom) / 2) + ") rotate(-90)\">" + html_text(chart.y_label) + "</text>\n";
+  svg += frame.names(chart.x_label, chart.y_label);
   for (std::size_t n = 0; n < chart.lines.size(); ++n) {
     const LineChart::Line line = thinned(chart.lines[n], 1000);
     std::string path;
@@ -260,7 +344,7 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
         drawing = false;
         continue;
       }
-      path += (drawing ? "L" : "M") + point(x_at(line.x[k])) + " " + point(y_at(line.y[k]));
+      path += (drawing ? "L" : "M") + point(x_at(line.x[k])) + " " + point(frame.y_at(line.y[k]));
       drawing = true;
     }
     svg += "<path" + line_style(chart, n) + " d=\"" + path + "\"/>\n";
@@ -339,9 +423,17 @@ class HtmlReport {
     for (const LineChart::Line& line : chart.lines) {
       expects(line.x.size() == line.y.size(), "LineChart: numbers of x and y of a line", "equal, y has", line.y.size());
     }
-    body_ += "<figure><figcaption class=\"title\">" + detail::html_text(chart.title) + "</figcaption>\n" +
-             detail::chart_legend(chart) + detail::chart_svg(chart, detail::wide_chart) +
-             detail::chart_svg(chart, detail::narrow_chart) + "</figure>\n";
+    figure(chart.title, detail::chart_legend(chart) + detail::chart_svg(chart, detail::wide_chart) +
+                            detail::chart_svg(chart, detail::narrow_chart));
+  }
+
+  void bar_chart(const BarChart& chart) {
+    for (const BarChart::Bars& bars : chart.bars) {
+      expects(bars.heights.size() == chart.groups.size(), "BarChart: number of heights", "that of groups",
+              bars.heights.size());
+    }
+    figure(chart.title, detail::bar_chart_legend(chart) + detail::bar_chart_svg(chart, detail::wide_chart) +
+                            detail::bar_chart_svg(chart, detail::narrow_chart));
   }
 
   void picture(const Picture& picture, const std::string& caption) {
@@ -441,6 +533,11 @@ class HtmlReport {
   void write(const std::filesystem::path& path) const { detail::write_text_file(path, text()); }
 
  private:
+  void figure(const std::string& title, const std::string& content) {
+    body_ +=
+        "<figure><figcaption class=\"title\">" + detail::html_text(title) + "</figcaption>\n" + content + "</figure>\n";
+  }
+
   static const char* style() {
     return R"(body{font:16px/1.5 system-ui,sans-serif;color:#1c232b;background:#fff;max-width:920px;margin:2em auto;padding:0 1em}
 h1{font-size:1.6em;line-height:1.25;margin-bottom:.3em}h2{font-size:1.2em;margin:2em 0 .5em}p{max-width:44em}
@@ -480,7 +577,7 @@ button{min-width:5.2em}
   static const char* film_script() {
     return R"(const part = name => document.getElementById(name);
 const film = part('film'), scrub = part('scrub'), play = part('play'), label = part('time'), choice = part('choice');
-const charts = document.querySelectorAll('.chart');
+const charts = document.querySelectorAll('.chart[data-low]');  // those over time
 let timer = null;
 // whole steps of screen pixels keep edges crisp
 function fit() {

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+// How much was in it: the second experiment of Schenck and Fox (2017) on twins of their pours:
+//   fill_experiment FOLDER --json OUT.json --report OUT.html
+// Recordings and results are kept in the folder: a run that was stopped goes on where it was, another only prints.
+// Exit status 0: done; 1: a recording could not be followed to its end; 2: a recording, a file or an argument is wrong.
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "support/experiment_report.hpp"
+#include "support/fill_experiment.hpp"
+#include "support/fill_tables.hpp"
+#include "support/result_file.hpp"
+
+namespace {
+
+/// Throws std::runtime_error where `only` names a recording that there is none of.
+void keep(const std::vector<std::string>& only, std::vector<example::Pour>& levels,
+          std::vector<example::Pour>& amounts) {
+  const auto named = [](const std::vector<example::Pour>& pours, const std::string& name) {
+    return std::any_of(pours.begin(), pours.end(), [&](const auto& each) { return each.name == name; });
+  };
+  for (const std::string& name : only) {
+    if (!named(levels, name) && !named(amounts, name)) {
+      throw std::runtime_error("--only: the experiment has no recording " + name);
+    }
+  }
+  for (auto* pours : {&levels, &amounts}) {
+    std::erase_if(*pours, [&](const example::Pour& each) {
+      return !only.empty() && std::find(only.begin(), only.end(), each.name) == only.end();
+    });
+  }
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  std::string folder, json_file, report_file, set = "all";
+  std::vector<std::string> only;
+  example::FillExperimentOptions options;
+  double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
+  CLI::App app("Estimates how much was in containers that are poured from, and scores the estimates.");
+  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
+  app.add_option("folder", folder, "where recordings and results are kept")->required();
+  app.add_option("--set", set,
+                 "levels: the paper's pours, empty to 90 % full, by each method; amounts: any amounts, by the default "
+                 "method; all: both")
+      ->check(CLI::IsMember({"levels", "amounts", "all"}));
+  app.add_option("--only", only, "recordings of the set, such as cup_30_1, several by commas")->delimiter(',');
+  app.add_option("--threads", options.threads, "runs side by side, each on one thread; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--json", json_file, "writes results and tables");
+  app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
+  app.add_flag("--again", options.again, "computes results that are there already anew; recordings are kept");
+  // smaller recordings, for tests; group "" is not in the help
+  app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
+  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
+  app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(0.0, 20.0))->group("");
+  app.add_option("--grid-step", options.grid_step)->check(CLI::Range(2, 50))->group("");
+  try {
+    app.parse(count, values);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  options.folder = folder;
+  options.reality_spacing = 1e-3 * reality_mm;
+  options.model_spacing = 1e-3 * model_mm;
+  try {
+    for (const std::string& file : {json_file, report_file}) {
+      if (!file.empty()) {
+        example::expect_writable(file);
+      }
+    }
+    const std::vector<std::string> methods = example::FillOptions{}.methods;
+    auto levels = set == "amounts" ? std::vector<example::Pour>() : example::level_pours();
+    auto amounts = set == "levels" ? std::vector<example::Pour>() : example::amount_pours();
+    keep(only, levels, amounts);
+    example::FillExperiment experiment(options);
+    experiment.record(levels);
+    experiment.record(amounts);
+    experiment.run(levels, methods);
+    experiment.run(amounts, {});
+    auto sections = example::fill_tables(experiment, levels, amounts, methods);
+    const auto& results = experiment.folder().results();
+    for (auto& section : example::failures_of(results)) {
+      sections.push_back(std::move(section));
+    }
+    example::print_sections(sections);
+    const std::size_t recordings = levels.size() + amounts.size();
+    std::printf("%zu of %zu recordings made, %zu of %zu results computed\n", experiment.folder().recorded(), recordings,
+                experiment.folder().computed(), experiment.folder().asked());
+    if (!json_file.empty()) {
+      nlohmann::json json;
+      json["results"] = results;
+      json["tables"] = example::sections_json(sections);
+      example::write_result(json_file, json);
+    }
+    if (!report_file.empty()) {
+      example::write_experiment_report(
+          report_file, "How much was in it",
+          std::to_string(recordings) + (recordings == 1 ? " recording of " : " recordings of ") +
+              decant::detail::fixed_text(options.duration, 1) + " s; particles of " +
+              decant::detail::fixed_text(reality_mm, 1) +
+              " mm in reality, and 6000 of them in a full container of the model. The amount is hidden from the "
+              "estimates.",
+          sections);
+    }
+    return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
+               ? 1
+               : 0;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  }
+}
