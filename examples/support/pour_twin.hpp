@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// A twin of a robot's pour, for experiments that need the truth: a "reality" that is not the model which tracks it.
-/// It has another pressure solver, kernel, spacing and time step, physics that the model lacks, a shaking hand, and a
-/// recorder with ragged masks, dropped frames and noisy poses.
+/// A twin of a robot's pour, for experiments that need the truth.
 
 #include <algorithm>
 #include <cmath>
@@ -23,18 +21,16 @@
 
 #include <decant/boundary/shapes.hpp>
 #include <decant/camera/pinhole_camera.hpp>
-#include <decant/camera/ray_occlusion.hpp>
 #include <decant/force/linear_drag.hpp>
-#include <decant/io/png.hpp>
-#include <decant/io/recording_writer.hpp>
-#include <decant/kernel/wendland_c2.hpp>
-#include <decant/projector/silhouette.hpp>
 #include <decant/pressure/dfsph.hpp>
 #include <decant/pressure/position_based.hpp>
 #include <decant/pressure/state_equation.hpp>
+#include <decant/io/recording.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
+
+#include "twin.hpp"
 
 namespace example {
 
@@ -50,31 +46,6 @@ struct PourTwin {
   double duration = 4;     ///< [s]
   double frames_per_second = 30;
   int threads = 0;  ///< 0: all; the recording does not depend on it
-};
-
-/// Physics of the reality that the model does not have. Two of these are drawn for each recording.
-struct HiddenPhysics {
-  decant::Vector3<double> pull{0, 0, 0};  ///< sideways acceleration [m/s^2]: a table that is not level, an air stream
-  double drag = 0;                        ///< slows all motion [1/s]: a model of what breaks up a jet
-  bool sticky_walls = false;              ///< liquid does not slip along the container
-  double kinematic_viscosity = 1e-6;      ///< [m^2/s]
-  double latency = 0;                     ///< poses were recorded so late [s]
-
-  std::string words() const {
-    std::string text;
-    const auto say = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
-    if (pull.norm() > 0)
-      say("sideways pull");
-    if (drag > 0)
-      say("drag");
-    if (sticky_walls)
-      say("sticky walls");
-    if (kinematic_viscosity > 1e-6)
-      say("thick liquid");
-    if (latency > 0)
-      say("late poses");
-    return text.empty() ? "nothing" : text;
-  }
 };
 
 inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
@@ -115,14 +86,6 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   }
   return hidden;
 }
-
-template <class PressureSolverType>
-struct RealityParts : decant::DefaultParts<float> {
-  using Kernel = decant::WendlandC2<float>;
-  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
-                            decant::LinearDrag<float>>;
-  using PressureSolver = PressureSolverType;
-};
 
 /// The same liquid at rest is settled by a third solver: these two start badly from liquid that was packed.
 using SettledParts = RealityParts<decant::Dfsph<float>>;
@@ -205,68 +168,7 @@ inline decant::PoseTrack pour_motion(const PourTwin& twin, const decant::Vector3
 
 /// The camera, 640 x 480: from the side the liquid does not come from, a little above, looking at the pan and the jet.
 inline decant::PinholeCamera pour_camera() { return {600, 600, 319.5, 239.5, 640, 480}; }
-inline decant::Pose pour_camera_from_world() {
-  const decant::Vector3<double> eye(0.21, -0.44, 0.32), target(0.0, 0, 0.09);
-  const decant::Vector3<double> ahead = (target - eye).normalized();
-  const decant::Vector3<double> right = ahead.cross(decant::Vector3<double>::UnitZ()).normalized();
-  decant::Matrix3<double> camera_axes;
-  camera_axes.row(0) = right;
-  camera_axes.row(1) = ahead.cross(right);
-  camera_axes.row(2) = ahead;
-  return {Eigen::Quaterniond(camera_axes), -(camera_axes * eye)};
-}
-
-/// What a segmentation network makes of a silhouette: shifted by a pixel at most, frayed along its edge, with specks.
-class MaskNoise {
- public:
-  explicit MaskNoise(std::uint32_t seed) : random_(31 * seed + 5) {
-    const auto between = [&](double low, double high) {
-      return std::uniform_real_distribution<double>(low, high)(random_);
-    };
-    flips_ = between(0.2, 0.4);
-    salt_ = between(0.004, 0.018);
-    shift_x_ = static_cast<int>(random_() % 3) - 1;
-    shift_y_ = static_cast<int>(random_() % 3) - 1;
-  }
-
-  decant::Mask apply(const decant::Mask& clean) {
-    decant::Mask noisy(clean.rows(), clean.cols());
-    std::uniform_real_distribution<double> share(0, 1);
-    const auto at = [&](decant::Index row, decant::Index column) {
-      row = std::clamp<decant::Index>(row - shift_y_, 0, clean.rows() - 1);
-      column = std::clamp<decant::Index>(column - shift_x_, 0, clean.cols() - 1);
-      return decant::is_liquid(clean(row, column));
-    };
-    for (decant::Index row = 0; row < clean.rows(); ++row) {
-      for (decant::Index column = 0; column < clean.cols(); ++column) {
-        bool liquid = at(row, column);
-        const bool edge = at(row - 1, column) != liquid || at(row + 1, column) != liquid ||
-                          at(row, column - 1) != liquid || at(row, column + 1) != liquid;
-        if (share(random_) < (edge ? flips_ : salt_)) {
-          liquid = !liquid;
-        }
-        noisy(row, column) = liquid ? decant::mask_liquid : std::uint8_t(0);
-      }
-    }
-    return noisy;
-  }
-
- private:
-  std::mt19937 random_;
-  double flips_ = 0, salt_ = 0;
-  int shift_x_ = 0, shift_y_ = 0;
-};
-
-/// A pose that is off by `millimetres` and `degrees`, in a direction that the generator draws.
-inline decant::Pose off_by(const decant::Pose& pose, double millimetres, double degrees, std::mt19937& random) {
-  std::normal_distribution<double> normal(0, 1);
-  const decant::Vector3<double> step =
-      decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
-  const decant::Vector3<double> axis =
-      decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
-  return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis) * pose.rotation,
-          pose.translation + 1e-3 * millimetres * step};
-}
+inline decant::Pose pour_camera_from_world() { return looking_at({0.21, -0.44, 0.32}, {0.0, 0, 0.09}); }
 
 namespace detail {
 
@@ -322,49 +224,16 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   }
   reality.set_motion(cup, PoseTrack(std::move(moving)));
 
-  std::mt19937 random(101 * twin.seed + 3);
-  const PinholeCamera camera = pour_camera();
-  const Pose camera_from_world = pour_camera_from_world();
   Recording header;
   header.name = folder.filename().string();
   header.frames_per_second = twin.frames_per_second;
-  header.width = camera.width();
-  header.height = camera.height();
-  const Pose pan_pose;
   header.bodies.push_back({1, twin.container, recording::Role::Source, {}, container.mesh, {}});
   header.bodies.push_back({2, "pan", recording::Role::Target, {}, pour_pan().mesh, {}});
   header.liquid.initial = recording::Initial{0, twin.fill_fraction, std::nullopt};
-  recording::View view;
-  view.fx = camera.fx();
-  view.fy = camera.fy();
-  view.cx = camera.cx();
-  view.cy = camera.cy();
-  view.camera_from_world = camera_from_world;
-  header.cameras.push_back({{view}});
-  RecordingWriter writer(folder, header);
-
-  // a tracker's error: an offset that lasts, and a little that comes and goes
-  const auto offset_seed = static_cast<std::uint32_t>(random());
-  const auto seen_pose = [&](const Pose& pose, double share, std::uint32_t which) {
-    if (!twin.noisy_poses) {
-      return pose;
-    }
-    std::mt19937 lasting(offset_seed + which);
-    return off_by(off_by(pose, 2 * share, 1 * share, lasting), 0.4 * share, 0.2 * share, random);
-  };
-
-  RayOcclusion<PinholeCamera> sight(PosedCamera<PinholeCamera>(camera, camera_from_world));
-  sight.add_bodies(reality.bodies(), 0);
-  // a film is wet between the particles that stand for it
-  const double depth = (camera_from_world * Vector3<double>::Zero()).z();
-  const int film_px = static_cast<int>(std::lround(1.25 * camera.fx() * twin.spacing / depth));
-  Silhouette<DiscSplat<float>> drawing(DiscSplat<float>(0.62 * twin.spacing), GapClosing(film_px));
-  MaskNoise noise(twin.seed);
-  Mask clean(camera.height(), camera.width());
-  std::vector<std::uint8_t> unseen;
+  TwinRecorder recorder(folder, header, pour_camera(), pour_camera_from_world(), {0, 0, 0},
+                        {twin.noisy_poses, twin.noisy_masks, twin.seed}, reality);
   nlohmann::json container_ml = nlohmann::json::array(), pan_ml = nlohmann::json::array();
   const int frames = static_cast<int>(std::lround(twin.duration * twin.frames_per_second));
-  std::filesystem::create_directories(folder / "truth_mask");
   for (int frame = 0; frame < frames; ++frame) {
     const double time = frame / twin.frames_per_second;
     StepReport report = reality.step(std::max(0.0, start + time - reality.time()));
@@ -374,21 +243,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
     }
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
-    sight.follow(reality.bodies(), reality.time());
-    unseen.resize(static_cast<std::size_t>(reality.fluid().size()));
-    find_hidden(sight, reality.fluid().position, settings.threads, unseen);
-    drawing.render(reality.fluid().position, unseen, camera, camera_from_world, clean, settings.threads);
-    write_png(folder / "truth_mask" / (decant::detail::six_digits(static_cast<std::size_t>(frame)) + ".png"), clean);
-
-    recording::Frame recorded;
-    recorded.bodies = {seen_pose(motion.at(std::max(0.0, time - hidden.latency)), 1, 0), seen_pose(pan_pose, 0.5, 1)};
-    recording::Shot shot;
-    const bool dropped = twin.noisy_masks && frame > 0 && random() % 40 == 0;
-    if (!dropped) {
-      shot.mask = twin.noisy_masks ? noise.apply(clean) : clean;
-    }
-    recorded.shots.push_back(std::move(shot));
-    writer.add_frame(recorded);
+    recorder.add_frame(reality, {{motion.at(std::max(0.0, time - hidden.latency)), 1}, {Pose{}, 0.5}});
     progress(static_cast<double>(frame + 1) / frames);
   }
   nlohmann::json truth;
@@ -403,8 +258,7 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   truth["spacing_mm"] = 1e3 * twin.spacing;
   truth["initial_ml"] = 1e6 * filled.volume;
   truth["volume_ml"] = {{twin.container, container_ml}, {"pan", pan_ml}};
-  writer.set_truth(truth.dump());
-  writer.finish();
+  recorder.finish(truth.dump());
 }
 
 }  // namespace detail
