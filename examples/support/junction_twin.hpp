@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A twin of the pipe junction of Schenck and Fox (2017), their third experiment: an inverted T whose legs bend down
+/// over two bowls, into which a litre pours as from a container that is tilted steadily. What blocks a leg is inside,
+/// where no camera sees.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/boundary/pipe_network.hpp>
+#include <decant/boundary/shapes.hpp>
+#include <decant/camera/pinhole_camera.hpp>
+#include <decant/force/linear_drag.hpp>
+#include <decant/io/recording.hpp>
+#include <decant/pressure/dfsph.hpp>
+#include <decant/pressure/position_based.hpp>
+#include <decant/simulation/inlet.hpp>
+#include <decant/simulation/parts.hpp>
+#include <decant/simulation/simulator.hpp>
+
+#include "twin.hpp"
+
+namespace example {
+
+/// What is in the pipes, and how the recording of it goes wrong.
+struct JunctionTwin {
+  double left_opening = 1, right_opening = 1;  ///< of each leg's cross-section, 0 .. 1
+  double leak = 0;                             ///< area of a hole in the left leg's underside over the leg's, 0 .. 0.5
+  std::uint32_t seed = 1;
+  bool hidden_physics = true;  ///< false: the reality is the model itself, at another spacing
+  bool noisy_poses = true;
+  bool noisy_masks = true;
+  double spacing = 0.0035;  ///< of the reality's particles [m]
+  double duration = 4;      ///< [s]
+  double frames_per_second = 30;
+  int threads = 0;  ///< 0: all; the recording does not depend on it
+};
+
+/// Physics of the reality that the model does not have, and what it is told wrongly.
+struct JunctionErrors {
+  HiddenPhysics physics;
+  double flow_factor = 1;  ///< true flow over the recorded one
+  double flow_delay = 0;   ///< it comes so much later than recorded [s]
+};
+
+inline JunctionErrors draw_junction_errors(const JunctionTwin& twin) {
+  JunctionErrors errors;
+  if (!twin.hidden_physics) {
+    return errors;
+  }
+  std::mt19937 random(7919 * twin.seed + 29);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  errors.flow_factor = between(0.93, 1.07);
+  errors.flow_delay = between(0, 0.07);
+  std::vector<int> kinds{0, 1, 2};
+  std::shuffle(kinds.begin(), kinds.end(), random);
+  for (int k = 0; k < 2; ++k) {
+    switch (kinds[static_cast<std::size_t>(k)]) {
+      case 0: {  // a table that is not level: up to 3 degrees
+        const double size = between(0.2, 0.5), angle = between(0, 2 * std::numbers::pi);
+        errors.physics.pull = {size * std::cos(angle), size * std::sin(angle), 0};
+        break;
+      }
+      case 1:
+        errors.physics.drag = between(0.3, 0.7);
+        break;
+      default:
+        errors.physics.kinematic_viscosity = std::pow(10.0, between(-5, -4.3));
+        break;
+    }
+  }
+  return errors;
+}
+
+/// A leg that is blocked has a bore that narrows and widens again at once, about a place that the seed draws.
+inline decant::PipeNetwork junction_pipes(const JunctionTwin& twin) {
+  std::mt19937 random(389 * twin.seed + 7);
+  decant::PipeNetwork pipes;
+  pipes.radius = 0.012;
+  pipes.places = {{0, 0.34}, {-0.13, 0.175}, {0.13, 0.175}, {0, 0.18}, {-0.13, 0.125}, {0.13, 0.125}};
+  pipes.pipes = {{0, 3}, {3, 1}, {3, 2}, {1, 4}, {2, 5}};
+  for (const std::size_t leg : {std::size_t{1}, std::size_t{2}}) {
+    const double opening = leg == 1 ? twin.left_opening : twin.right_opening;
+    const double place = std::uniform_real_distribution<double>(0.35, 0.75)(random);
+    if (opening < 1) {
+      // a bore that is nothing would have walls of no thickness: less than any particle passes
+      const double bore = std::max(std::sqrt(opening), 0.02);
+      pipes.pipes[leg].bore = {{0, 1}, {place - 0.06, 1}, {place - 0.05, bore}, {place + 0.05, bore}, {place + 0.06, 1},
+                               {1, 1}};
+    }
+  }
+  if (twin.leak > 0) {
+    // a window below: length times width
+    const double area = twin.leak * pipes.bore_area(), width = 0.012;
+    const double share = area / width / std::hypot(0.13, 0.005);
+    pipes.holes = {{1, 0.5 - share / 2, 0.5 + share / 2, std::numbers::pi / 2, width / pipes.radius}};
+  }
+  return pipes;
+}
+
+/// As the recording has it: nothing blocks it.
+inline decant::TriangleMesh junction_as_known() { return junction_pipes({}).mesh(); }
+
+inline decant::TriangleMesh junction_bowl() { return decant::Bowl{0.1, 0.08, 0.003}.mesh(); }
+inline std::array<decant::Pose, 2> junction_bowl_poses() {
+  return {decant::Pose{Eigen::Quaterniond::Identity(), {-0.14, 0, 0.02}},
+          decant::Pose{Eigen::Quaterniond::Identity(), {0.14, 0, 0.02}}};
+}
+
+/// A cube of a litre that is tilted steadily about its lip, full to the brim at first, empty when it lies on its side.
+inline std::vector<std::pair<double, double>> litre_from_tilted_cube(double begin, double end) {
+  const double litre = 1e-3, rate = 0.5 * std::numbers::pi / (end - begin);  // [rad/s]
+  std::vector<std::pair<double, double>> flow{{begin - 0.05, 0.0}};
+  constexpr int steps = 40;
+  for (int k = 0; k <= steps; ++k) {
+    const double tilt = 0.5 * std::numbers::pi * k / steps, steeper = std::max(tilt, 0.25 * std::numbers::pi);
+    const double side = tilt < steeper ? std::cos(tilt) : std::sin(tilt);
+    flow.emplace_back(begin + tilt / rate, 0.5 * litre * rate / (side * side));
+  }
+  flow.emplace_back(end + 0.05, 0.0);
+  return flow;
+}
+
+/// @param errors those of the reality; none for what the recording says.
+inline decant::InletSettings junction_inlet(const JunctionErrors& errors) {
+  decant::InletSettings inlet;
+  inlet.position = {0, 0, 0.325};
+  inlet.radius = 0.009;
+  inlet.flow = litre_from_tilted_cube(0.3, 3.2);
+  for (auto& [time, flow] : inlet.flow) {
+    time += errors.flow_delay;
+    flow *= errors.flow_factor;
+  }
+  return inlet;
+}
+
+inline decant::PinholeCamera junction_camera() { return {560, 560, 319.5, 239.5, 640, 480}; }
+
+namespace detail {
+
+template <class Parts>
+void record_junction(const JunctionTwin& twin, const JunctionErrors& errors, const std::string& solver_name,
+                     const std::filesystem::path& folder, const std::function<void(double)>& progress) {
+  using namespace decant;
+  SimulatorSettings settings;
+  settings.spacing = twin.spacing;
+  settings.threads = {twin.threads};
+  settings.gravity += errors.physics.pull;
+  settings.liquid.dynamic_viscosity = errors.physics.kinematic_viscosity * settings.liquid.density;
+  Simulator<Parts> reality(settings);
+  const auto bowl_poses = junction_bowl_poses();
+  reality.add_body("junction", junction_pipes(twin).mesh());
+  const BodyId left = reality.add_body("left bowl", junction_bowl(), PoseTrack(bowl_poses[0]));
+  const BodyId right = reality.add_body("right bowl", junction_bowl(), PoseTrack(bowl_poses[1]));
+  reality.add_inlet(junction_inlet(errors), Origin{3});
+  reality.watch_contents(left);
+  reality.watch_contents(right);
+  if constexpr (!std::is_same_v<Parts, DefaultParts<>>) {
+    reality.template force<LinearDrag<float>>().rate = static_cast<float>(errors.physics.drag);
+  }
+
+  Recording header;
+  header.name = folder.filename().string();
+  header.frames_per_second = twin.frames_per_second;
+  header.bodies.push_back({1, "junction", recording::Role::Junction, {}, junction_as_known(), {}});
+  header.bodies.push_back({2, "left bowl", recording::Role::Target, {}, junction_bowl(), {}});
+  header.bodies.push_back({3, "right bowl", recording::Role::Target, {}, junction_bowl(), {}});
+  header.liquid.inlet = junction_inlet({});
+  TwinRecorder recorder(folder, header, junction_camera(), looking_at({0, -0.42, 0.62}, {0, 0, 0.08}), {0, 0, 0},
+                        {twin.noisy_poses, twin.noisy_masks, twin.seed}, reality);
+  nlohmann::json left_ml = nlohmann::json::array(), right_ml = nlohmann::json::array();
+  const int frames = static_cast<int>(std::lround(twin.duration * twin.frames_per_second));
+  for (int frame = 0; frame < frames; ++frame) {
+    const double time = frame / twin.frames_per_second;
+    const StepReport report = reality.step(std::max(0.0, time - reality.time()));
+    if (!report.advanced()) {
+      throw std::runtime_error("the reality stopped at " + std::to_string(time) +
+                               " s: " + std::string(to_string(report.status)));
+    }
+    left_ml.push_back(1e6 * report.contents[0].volume);
+    right_ml.push_back(1e6 * report.contents[1].volume);
+    recorder.add_frame(reality, {{Pose{}, 0.5}, {bowl_poses[0], 0.5}, {bowl_poses[1], 0.5}});
+    progress(static_cast<double>(frame + 1) / frames);
+  }
+  nlohmann::json truth;
+  truth["left_opening"] = twin.left_opening;
+  truth["right_opening"] = twin.right_opening;
+  truth["leak"] = twin.leak;
+  truth["hidden"] = errors.physics.words();
+  truth["flow_factor"] = errors.flow_factor;
+  truth["flow_delay_s"] = errors.flow_delay;
+  truth["pull_m_s2"] = {errors.physics.pull.x(), errors.physics.pull.y(), errors.physics.pull.z()};
+  truth["drag_1_s"] = errors.physics.drag;
+  truth["kinematic_viscosity_m2_s"] = errors.physics.kinematic_viscosity;
+  truth["solver"] = solver_name;
+  truth["seed"] = twin.seed;
+  truth["spacing_mm"] = 1e3 * twin.spacing;
+  truth["volume_ml"] = {{"left bowl", left_ml}, {"right bowl", right_ml}};
+  recorder.finish(truth.dump());
+}
+
+}  // namespace detail
+
+/// Makes the recording in a new folder, with the clean silhouettes beside it (truth_mask/, for scoring alone).
+/// @param progress is told how far it is, 0 .. 1. Throws std::invalid_argument and std::runtime_error.
+inline void record_junction(
+    const JunctionTwin& twin, const std::filesystem::path& folder,
+    const std::function<void(double)>& progress = [](double) {}) {
+  using namespace decant;
+  for (const double opening : {twin.left_opening, twin.right_opening}) {
+    expects(opening >= 0 && opening <= 1, "JunctionTwin: opening of a leg", "in [0, 1]", opening);
+  }
+  expects(twin.leak >= 0 && twin.leak <= 0.5, "JunctionTwin: leak", "in [0, 0.5]", twin.leak);
+  const JunctionErrors errors = draw_junction_errors(twin);
+  if (!twin.hidden_physics) {
+    detail::record_junction<DefaultParts<>>(twin, errors, "divergence-free", folder, progress);
+  } else if (twin.seed % 2 == 1) {
+    detail::record_junction<RealityParts<PositionBased<float>>>(twin, errors, "position-based", folder, progress);
+  } else {
+    detail::record_junction<RealityParts<Dfsph<float>>>(twin, errors, "divergence-free, another kernel", folder,
+                                                        progress);
+  }
+}
+
+}  // namespace example
