@@ -27,6 +27,7 @@ namespace example {
 struct NamedModel {
   std::string name;
   TrackingModel model;
+  double log_prior = 0;  ///< see HypothesisFilter
 };
 
 /// What may speak for or against a hypothesis, over all frames that it was followed for.
@@ -107,7 +108,7 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
   HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings);
   for (const NamedModel& hypothesis : hypotheses) {
     course.names.push_back(hypothesis.name);
-    filter.add(tracker_for(recording, hypothesis.model, CorrectorType(), each));
+    filter.add(tracker_for(recording, hypothesis.model, CorrectorType(), each), hypothesis.log_prior);
   }
   course.log_posterior.resize(hypotheses.size());
   course.evidence.resize(hypotheses.size());

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// Which leg of the pipe junction that a recording shows is blocked, and how much of it is open:
+//   find_blockage RECORDING_DIR --json OUT.json --report OUT.html
+// Exit status 0: done; 1: the recording could not be followed to its end; 2: it, a file or an argument is wrong.
+
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <decant/core/stopwatch.hpp>
+#include <decant/io/detail/text.hpp>
+#include <decant/io/progress.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/io/report.hpp>
+#include <decant/io/table.hpp>
+
+#include "support/blockage.hpp"
+#include "support/result_file.hpp"
+
+namespace {
+
+using decant::detail::fixed_text;
+
+decant::Table table_of(const example::BlockageResult& result) {
+  decant::Table table({"configuration", "probability [%]"});
+  for (const auto& [name, course] : result.configurations) {
+    const bool none = name == example::PosteriorCourse::none_name;
+    table.add({none ? "none of these" : name, course.empty() ? "-" : fixed_text(100 * course.back(), 1)});
+  }
+  return table;
+}
+
+decant::Table openings_of(const example::BlockageResult& result) {
+  decant::Table table({"leg", "open [%]", "from", "to"});
+  for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+    if (const auto& opening = result.leg_opening[leg]) {
+      table.add({result.legs[leg].name, fixed_text(100 * opening->median, 0), fixed_text(100 * opening->low, 0),
+                 fixed_text(100 * opening->high, 0)});
+    }
+  }
+  return table;
+}
+
+std::string sentence(const example::BlockageResult& result) {
+  const std::string answer = example::blockage_answer(result);
+  const auto decided = example::decided_at(result, 0.9);
+  const std::string what = answer == example::PosteriorCourse::none_name ? "none of the configurations"
+                           : answer == "none"                            ? "no leg is blocked"
+                                                                         : answer;
+  return result.junction + ": " + what +
+         (decided ? ", more than 90 % probable from " + fixed_text(*decided, 2) + " s on" : ", undecided");
+}
+
+void write_report(const std::string& file, const decant::Recording& recording, const example::BlockageResult& result) {
+  decant::HtmlReport report("What is blocked: " + recording.name);
+  report.paragraph(sentence(result) + ".");
+  report.heading("Configurations");
+  report.table(table_of(result));
+  report.chart(example::blockage_chart(result));
+  report.heading("How much of each leg is open");
+  report.table(openings_of(result));
+  report.paragraph("From .. to: the 90 % interval, where at most one leg is not wholly open.");
+  report.heading("Every hypothesis");
+  report.chart(example::course_chart("Leg and opening [%]", result.course));
+  report.write(file);
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  std::string folder, json_file, report_file;
+  example::BlockageOptions options;
+  double spacing_mm = 0;
+  CLI::App app("Finds out which leg of a pipe junction is blocked by what runs out of it.");
+  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
+  app.add_option("recording", folder, "folder of a recording, format version 1, with a body of the role junction")
+      ->required();
+  app.add_option("--json", json_file, "writes the posterior over time and the openings");
+  app.add_option("--report", report_file, "writes a page with charts, for a browser");
+  app.add_option("--method", options.method, "how each hypothesis follows the recording")
+      ->check(CLI::IsMember({"open_loop", "map_filter", "warp_field", "default"}));
+  app.add_option("--spacing-mm", spacing_mm, "of the model's particles; 0: five across a leg")
+      ->check(CLI::Range(0.0, 20.0));
+  app.add_option("--threads", options.tracking.threads, "0: all")->check(CLI::Range(0, 1024));
+  try {
+    app.parse(count, values);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  options.tracking.spacing = 1e-3 * spacing_mm;
+  try {
+    for (const std::string& file : {json_file, report_file}) {
+      if (!file.empty()) {
+        example::expect_writable(file);
+      }
+    }
+    const decant::Recording recording = decant::read_recording(folder);
+    decant::Progress progress(recording.name, 1);
+    double milliseconds = 0;
+    example::BlockageResult result;
+    {
+      const decant::Stopwatch watch(milliseconds);
+      result = example::find_blockage(recording, options, [&](double share) { progress.update(share); });
+    }
+    progress.finish();
+    std::printf("%s\n%s%s", sentence(result).c_str(), table_of(result).text().c_str(),
+                openings_of(result).text().c_str());
+    if (!json_file.empty()) {
+      nlohmann::json json = example::blockage_json(result, options.confidence);
+      json["seconds"] = 1e-3 * milliseconds;
+      example::write_result(json_file, json);
+    }
+    if (!report_file.empty()) {
+      write_report(report_file, recording, result);
+    }
+    return result.course.status == "ok" ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  }
+}
