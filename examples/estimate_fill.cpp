@@ -25,14 +25,6 @@
 
 namespace {
 
-std::vector<std::string> method_names() {
-  std::vector<std::string> names;
-  for (const auto& method : example::fill_methods()) {
-    names.push_back(method.first);
-  }
-  return names;
-}
-
 /// Probabilities [%] by method and level.
 decant::Table table_of(const example::FillResult& result, const example::FillOptions& options) {
   std::vector<std::string> header{"probability of [%]"};
@@ -100,7 +92,7 @@ int main(int count, char** values) {
   app.add_option("--report", report_file, "writes a page with charts, for a browser");
   app.add_option("--methods", options.methods, "that choose from the levels; several by commas")
       ->delimiter(',')
-      ->check(CLI::IsMember(method_names()));
+      ->check(CLI::IsMember(example::weighing_methods()));
   app.add_option("--levels", options.levels, "to choose from [% of what the container holds], by commas")
       ->delimiter(',')
       ->check(CLI::Range(0, 100));

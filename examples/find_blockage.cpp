@@ -81,7 +81,7 @@ int main(int count, char** values) {
   app.add_option("--json", json_file, "writes the posterior over time and the openings");
   app.add_option("--report", report_file, "writes a page with charts, for a browser");
   app.add_option("--method", options.method, "how each hypothesis follows the recording")
-      ->check(CLI::IsMember({"open_loop", "map_filter", "warp_field", "default"}));
+      ->check(CLI::IsMember(example::weighing_methods()));
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles; 0: five across a leg")
       ->check(CLI::Range(0.0, 20.0));
   app.add_option("--threads", options.tracking.threads, "0: all")->check(CLI::Range(0, 1024));

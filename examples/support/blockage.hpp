@@ -20,10 +20,6 @@
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/pipe_blockage.hpp>
 #include <decant/boundary/pipe_openings.hpp>
-#include <decant/correction/map_filter_schenck2017.hpp>
-#include <decant/correction/open_loop.hpp>
-#include <decant/correction/silhouette_corrector.hpp>
-#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/io/recording.hpp>
 
@@ -32,7 +28,7 @@
 namespace example {
 
 struct BlockageOptions {
-  std::string method = "default";
+  std::string method = default_method;
   /// Of a leg that is blocked in part, those that are tried, increasing between 0 and 1; 0 and 1 are in any case.
   std::vector<double> openings{0.2, 0.4, 0.6};
   double confidence = 0.9;
@@ -112,24 +108,6 @@ inline std::vector<JunctionLeg> junction_legs(const decant::Recording& recording
 }
 
 namespace detail {
-
-inline PosteriorCourse weigh_by(const std::string& method, const decant::Recording& recording,
-                                const std::vector<NamedModel>& models, const TrackingOptions& options,
-                                const decant::HypothesisFilterSettings& settings,
-                                const std::function<void(double)>& progress) {
-  using namespace decant;
-  if (method == "open_loop") {
-    return weigh<OpenLoop<>>(recording, models, options, settings, progress);
-  }
-  if (method == "map_filter") {
-    return weigh<MapFilterSchenck2017<>>(recording, models, options, settings, progress);
-  }
-  if (method == "warp_field") {
-    return weigh<WarpFieldSchenck2017<>>(recording, models, options, settings, progress);
-  }
-  expects(method == "default", "find_blockage: method", "open_loop, map_filter, warp_field or default", method);
-  return weigh<SilhouetteCorrector<>>(recording, models, options, settings, progress);
-}
 
 inline double log_of_sum(const std::vector<double>& logs) {
   const double largest =
@@ -214,7 +192,7 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
   HypothesisFilterSettings settings;
   settings.posterior = options.posterior;
   settings.least_probability = options.least_probability;
-  result.course = detail::weigh_by(options.method, recording, models, tracking, settings, progress);
+  result.course = weigh_by(options.method, recording, models, tracking, settings, progress);
 
   const std::vector<std::vector<double>> probability = result.course.probability();
   const auto sum_of = [&](const std::string& name, auto belongs) {

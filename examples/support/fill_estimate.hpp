@@ -21,10 +21,6 @@
 
 #include <decant/boundary/cavity.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
-#include <decant/correction/map_filter_schenck2017.hpp>
-#include <decant/correction/open_loop.hpp>
-#include <decant/correction/silhouette_corrector.hpp>
-#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/io/recording.hpp>
 #include <decant/simulation/fill.hpp>
@@ -35,7 +31,7 @@ namespace example {
 
 struct FillOptions {
   std::vector<int> levels{0, 30, 60, 90};  ///< [% of what the container holds], those that methods choose from
-  std::vector<std::string> methods{"open_loop", "map_filter", "warp_field", "default"};
+  std::vector<std::string> methods = weighing_methods();
   int grid_step = 10;  ///< [%] of the amounts between which the default method finds one
   double confidence = 0.9;
   double particles_in_full = 6000;  ///< where tracking.spacing is 0
@@ -83,25 +79,7 @@ inline double capacity_ml(const decant::Recording& recording, std::size_t body) 
   return 1e6 * cavity.volume();
 }
 
-using Weigh =
-    std::function<PosteriorCourse(const decant::Recording&, const std::vector<NamedModel>&, const TrackingOptions&,
-                                  decant::HypothesisFilterSettings, const std::function<void(double)>&)>;
-
 }  // namespace detail
-
-/// The one by which the amount is estimated.
-inline const std::string default_method = "default";
-
-/// By the names that scripts use; those of the paper are as printed.
-inline const std::vector<std::pair<std::string, detail::Weigh>>& fill_methods() {
-  static const std::vector<std::pair<std::string, detail::Weigh>> all{
-      {"open_loop", weigh<decant::OpenLoop<>>},
-      {"map_filter", weigh<decant::MapFilterSchenck2017<>>},
-      {"warp_field", weigh<decant::WarpFieldSchenck2017<>>},
-      {default_method, weigh<decant::SilhouetteCorrector<>>},
-  };
-  return all;
-}
 
 /// @param progress is told what is done, and the share of all, 0 .. 1. Throws std::runtime_error for a recording
 /// without a container, std::invalid_argument for options that make no sense.
@@ -140,9 +118,6 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
   }
   double job = 1;
   const auto run = [&](const std::string& method, const std::set<int>& chosen, double least_probability) {
-    const auto found = std::find_if(fill_methods().begin(), fill_methods().end(),
-                                    [&](const auto& known) { return known.first == method; });
-    expects(found != fill_methods().end(), "estimate_fill: method", "one of the known names", method);
     std::vector<NamedModel> models;
     for (const int percent : chosen) {
       models.push_back({std::to_string(percent), filled.at(percent)});
@@ -150,8 +125,8 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
     HypothesisFilterSettings settings;
     settings.posterior = options.posterior;
     settings.least_probability = least_probability;
-    PosteriorCourse course = found->second(recording, models, tracking, settings,
-                                           [&](double share) { progress(method, (job + share) / jobs); });
+    PosteriorCourse course = weigh_by(method, recording, models, tracking, settings,
+                                      [&](double share) { progress(method, (job + share) / jobs); });
     ++job;
     return course;
   };

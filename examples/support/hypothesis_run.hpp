@@ -14,6 +14,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include <decant/core/expects.hpp>
+#include <decant/correction/map_filter_schenck2017.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/correction/silhouette_corrector.hpp>
+#include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/report.hpp>
@@ -144,6 +149,34 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
     progress(static_cast<double>(frame + 1) / static_cast<double>(recording.frames));
   }
   return course;
+}
+
+/// The one by which questions are answered unless another is asked for.
+inline const std::string default_method = "default";
+
+/// How hypotheses may follow a recording, by the names that scripts use; those of the paper are as printed.
+inline const std::vector<std::string>& weighing_methods() {
+  static const std::vector<std::string> names{"open_loop", "map_filter", "warp_field", default_method};
+  return names;
+}
+
+/// The same by name. Throws std::invalid_argument for another name.
+inline PosteriorCourse weigh_by(const std::string& method, const decant::Recording& recording,
+                                const std::vector<NamedModel>& hypotheses, const TrackingOptions& options,
+                                const decant::HypothesisFilterSettings& settings,
+                                const std::function<void(double)>& progress) {
+  using namespace decant;
+  if (method == "open_loop") {
+    return weigh<OpenLoop<>>(recording, hypotheses, options, settings, progress);
+  }
+  if (method == "map_filter") {
+    return weigh<MapFilterSchenck2017<>>(recording, hypotheses, options, settings, progress);
+  }
+  if (method == "warp_field") {
+    return weigh<WarpFieldSchenck2017<>>(recording, hypotheses, options, settings, progress);
+  }
+  expects(method == default_method, "weigh_by: method", "open_loop, map_filter, warp_field or default", method);
+  return weigh<SilhouetteCorrector<>>(recording, hypotheses, options, settings, progress);
 }
 
 /// The last frame's probabilities, by name.
