@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <set>
 #include <string>
 #include <vector>
@@ -22,6 +21,7 @@
 
 #include "support/fill_estimate.hpp"
 #include "support/result_file.hpp"
+#include "support/tool.hpp"
 
 namespace {
 
@@ -85,7 +85,6 @@ int main(int count, char** values) {
   options.tracking.spacing = 0;
   double spacing_mm = 0;
   CLI::App app("Estimates how much liquid was in the container that a recording shows being poured from.");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("recording", folder, "folder of a recording, format version 1; what it says of the amount is not used")
       ->required();
   app.add_option("--json", json_file, "writes the posterior and the amount");
@@ -101,18 +100,9 @@ int main(int count, char** values) {
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles; 0: 6000 of them in the full container")
       ->check(CLI::Range(0.0, 20.0));
   app.add_option("--threads", options.tracking.threads, "0: all")->check(CLI::Range(0, 1024));
-  try {
-    app.parse(count, values);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  options.tracking.spacing = 1e-3 * spacing_mm;
-  try {
-    for (const std::string& file : {json_file, report_file}) {
-      if (!file.empty()) {
-        example::expect_writable(file);
-      }
-    }
+  return example::run_tool(app, count, values, [&] {
+    options.tracking.spacing = 1e-3 * spacing_mm;
+    example::expect_writable({json_file, report_file});
     const decant::Recording recording = decant::read_recording(folder);
     decant::Progress progress(recording.name, 1);
     double milliseconds = 0;
@@ -133,8 +123,5 @@ int main(int count, char** values) {
       write_report(report_file, recording, result, options);
     }
     return result.grid.status == "ok" ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
+  });
 }

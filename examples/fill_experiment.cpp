@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,25 +17,20 @@
 #include "support/fill_experiment.hpp"
 #include "support/fill_tables.hpp"
 #include "support/result_file.hpp"
+#include "support/tool.hpp"
 
 namespace {
 
 /// Throws std::runtime_error where `only` names a recording that there is none of.
 void keep(const std::vector<std::string>& only, std::vector<example::Pour>& levels,
           std::vector<example::Pour>& amounts) {
-  const auto named = [](const std::vector<example::Pour>& pours, const std::string& name) {
-    return std::any_of(pours.begin(), pours.end(), [&](const auto& each) { return each.name == name; });
-  };
   for (const std::string& name : only) {
-    if (!named(levels, name) && !named(amounts, name)) {
+    if (!example::has_pour(levels, name) && !example::has_pour(amounts, name)) {
       throw std::runtime_error("--only: the experiment has no recording " + name);
     }
   }
-  for (auto* pours : {&levels, &amounts}) {
-    std::erase_if(*pours, [&](const example::Pour& each) {
-      return !only.empty() && std::find(only.begin(), only.end(), each.name) == only.end();
-    });
-  }
+  example::keep_pours(levels, only);
+  example::keep_pours(amounts, only);
 }
 
 }  // namespace
@@ -47,7 +41,6 @@ int main(int count, char** values) {
   example::FillExperimentOptions options;
   double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
   CLI::App app("Estimates how much was in containers that are poured from, and scores the estimates.");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("folder", folder, "where recordings and results are kept")->required();
   app.add_option("--set", set,
                  "levels: the paper's pours, empty to 90 % full, by each method; amounts: any amounts, by the default "
@@ -64,20 +57,11 @@ int main(int count, char** values) {
   app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
   app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(0.0, 20.0))->group("");
   app.add_option("--grid-step", options.grid_step)->check(CLI::Range(2, 50))->group("");
-  try {
-    app.parse(count, values);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  options.folder = folder;
-  options.reality_spacing = 1e-3 * reality_mm;
-  options.model_spacing = 1e-3 * model_mm;
-  try {
-    for (const std::string& file : {json_file, report_file}) {
-      if (!file.empty()) {
-        example::expect_writable(file);
-      }
-    }
+  return example::run_tool(app, count, values, [&] {
+    options.folder = folder;
+    options.reality_spacing = 1e-3 * reality_mm;
+    options.model_spacing = 1e-3 * model_mm;
+    example::expect_writable({json_file, report_file});
     const std::vector<std::string> methods = example::FillOptions{}.methods;
     auto levels = set == "amounts" ? std::vector<example::Pour>() : example::level_pours();
     auto amounts = set == "levels" ? std::vector<example::Pour>() : example::amount_pours();
@@ -115,8 +99,5 @@ int main(int count, char** values) {
     return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
                ? 1
                : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
+  });
 }

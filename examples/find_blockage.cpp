@@ -4,7 +4,6 @@
 // Exit status 0: done; 1: the recording could not be followed to its end; 2: it, a file or an argument is wrong.
 
 #include <cstdio>
-#include <exception>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -19,6 +18,7 @@
 
 #include "support/blockage.hpp"
 #include "support/result_file.hpp"
+#include "support/tool.hpp"
 
 namespace {
 
@@ -75,7 +75,6 @@ int main(int count, char** values) {
   example::BlockageOptions options;
   double spacing_mm = 0;
   CLI::App app("Finds out which leg of a pipe junction is blocked by what runs out of it.");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("recording", folder, "folder of a recording, format version 1, with a body of the role junction")
       ->required();
   app.add_option("--json", json_file, "writes the posterior over time and the openings");
@@ -85,18 +84,9 @@ int main(int count, char** values) {
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles; 0: five across a leg")
       ->check(CLI::Range(0.0, 20.0));
   app.add_option("--threads", options.tracking.threads, "0: all")->check(CLI::Range(0, 1024));
-  try {
-    app.parse(count, values);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  options.tracking.spacing = 1e-3 * spacing_mm;
-  try {
-    for (const std::string& file : {json_file, report_file}) {
-      if (!file.empty()) {
-        example::expect_writable(file);
-      }
-    }
+  return example::run_tool(app, count, values, [&] {
+    options.tracking.spacing = 1e-3 * spacing_mm;
+    example::expect_writable({json_file, report_file});
     const decant::Recording recording = decant::read_recording(folder);
     decant::Progress progress(recording.name, 1);
     double milliseconds = 0;
@@ -117,8 +107,5 @@ int main(int count, char** values) {
       write_report(report_file, recording, result);
     }
     return result.course.status == "ok" ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
+  });
 }

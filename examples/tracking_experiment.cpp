@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,6 +16,7 @@
 
 #include "support/experiment_tables.hpp"
 #include "support/result_file.hpp"
+#include "support/tool.hpp"
 #include "support/tracking_experiment.hpp"
 #include "support/tracking_methods.hpp"
 
@@ -55,13 +55,11 @@ Plan plan_of(const std::string& set, std::vector<std::string> methods, const std
   Plan plan;
   plan.pours = pours_of(set);
   for (const std::string& name : only) {
-    if (std::none_of(plan.pours.begin(), plan.pours.end(), [&](const auto& each) { return each.name == name; })) {
+    if (!example::has_pour(plan.pours, name)) {
       throw std::runtime_error("--only: set " + set + " has no recording " + name);
     }
   }
-  std::erase_if(plan.pours, [&](const example::Pour& each) {
-    return !only.empty() && std::find(only.begin(), only.end(), each.name) == only.end();
-  });
+  example::keep_pours(plan.pours, only);
   if (methods.empty()) {
     methods = {"open_loop", "default"};
     if (set == "pours") {
@@ -143,7 +141,6 @@ int main(int count, char** values) {
   example::ExperimentOptions options;
   double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
   CLI::App app("Tracks twins of pours by several methods, as in Schenck and Fox (2017), and scores them.");
-  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("folder", folder, "where recordings and results are kept")->required();
   app.add_option("--set", set,
                  "pours: the paper's, by method; harmless: nothing is wrong with the model; wrong_amount: the model is "
@@ -166,20 +163,11 @@ int main(int count, char** values) {
   app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
   app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
   app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(1.0, 20.0))->group("");
-  try {
-    app.parse(count, values);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  options.folder = folder;
-  options.reality_spacing = 1e-3 * reality_mm;
-  options.model_spacing = 1e-3 * model_mm;
-  try {
-    for (const std::string& file : {json_file, report_file}) {
-      if (!file.empty()) {
-        example::expect_writable(file);
-      }
-    }
+  return example::run_tool(app, count, values, [&] {
+    options.folder = folder;
+    options.reality_spacing = 1e-3 * reality_mm;
+    options.model_spacing = 1e-3 * model_mm;
+    example::expect_writable({json_file, report_file});
     const Plan plan = plan_of(set, methods, only, conditions);
     const std::vector<example::TrackingJob> jobs = jobs_of(set, plan);
     example::TrackingExperiment experiment(options);
@@ -210,8 +198,5 @@ int main(int count, char** values) {
     return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
                ? 1
                : 0;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  }
+  });
 }

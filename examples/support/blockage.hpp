@@ -153,6 +153,11 @@ inline std::optional<decant::ValueEstimate> opening_of(const BlockageResult& res
 inline BlockageResult find_blockage(const decant::Recording& recording, const BlockageOptions& options,
                                     const std::function<void(double)>& progress) {
   using namespace decant;
+  for (std::size_t k = 0; k < options.openings.size(); ++k) {
+    expects(options.openings[k] > (k > 0 ? options.openings[k - 1] : 0.0) && options.openings[k] < 1,
+            "find_blockage: openings", "increasing, between 0 and 1", options.openings[k]);
+  }
+  expects(options.particles_across > 0, "find_blockage: particles_across", "> 0", options.particles_across);
   BlockageResult result;
   const std::size_t body = junction_of(recording);
   result.junction = recording.bodies[body].name;

@@ -62,6 +62,17 @@ inline std::vector<Pour> paper_pours() {
   return pours;
 }
 
+inline bool has_pour(const std::vector<Pour>& pours, const std::string& name) {
+  return std::any_of(pours.begin(), pours.end(), [&](const Pour& each) { return each.name == name; });
+}
+
+/// Those of the names; all if there are no names.
+inline void keep_pours(std::vector<Pour>& pours, const std::vector<std::string>& names) {
+  std::erase_if(pours, [&](const Pour& each) {
+    return !names.empty() && std::find(names.begin(), names.end(), each.name) == names.end();
+  });
+}
+
 /// Calls work(k) for each k from 0 to count - 1 from several threads. The first exception lets no more begin, and is
 /// thrown when all that run have ended.
 inline void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
@@ -126,11 +137,13 @@ class ExperimentFolder {
   }
 
   /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
-  /// is there and was made otherwise.
-  void record(const std::vector<Pour>& pours) {
+  /// is there and was made otherwise. @param spacing of the reality's particles [m]. @param duration [s].
+  void record(const std::vector<Pour>& pours, double spacing, double duration) {
     std::vector<Pour> missing;
     for (Pour each : pours) {
       each.twin.threads = 1;
+      each.twin.spacing = spacing;
+      each.twin.duration = duration;
       if (std::filesystem::exists(recording(each))) {
         expect_made_as(each);
       } else {

@@ -63,13 +63,7 @@ class FillExperiment {
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
   /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(std::vector<Pour> pours) {
-    for (Pour& each : pours) {
-      each.twin.spacing = options_.reality_spacing;
-      each.twin.duration = options_.duration;
-    }
-    folder_.record(pours);
-  }
+  void record(const std::vector<Pour>& pours) { folder_.record(pours, options_.reality_spacing, options_.duration); }
 
   /// Estimates what is not there yet. @param methods that choose from levels, see FillOptions.
   void run(const std::vector<Pour>& pours, const std::vector<std::string>& methods) {

@@ -189,26 +189,18 @@ void record_junction(const JunctionTwin& twin, const JunctionErrors& errors, con
   const int frames = static_cast<int>(std::lround(twin.duration * twin.frames_per_second));
   for (int frame = 0; frame < frames; ++frame) {
     const double time = frame / twin.frames_per_second;
-    const StepReport report = reality.step(std::max(0.0, time - reality.time()));
-    if (!report.advanced()) {
-      throw std::runtime_error("the reality stopped at " + std::to_string(time) +
-                               " s: " + std::string(to_string(report.status)));
-    }
+    const StepReport report = step_reality(reality, time, time);
     left_ml.push_back(1e6 * report.contents[0].volume);
     right_ml.push_back(1e6 * report.contents[1].volume);
     recorder.add_frame(reality, {{Pose{}, 0.5}, {bowl_poses[0], 0.5}, {bowl_poses[1], 0.5}});
     progress(static_cast<double>(frame + 1) / frames);
   }
-  nlohmann::json truth;
+  nlohmann::json truth = errors.physics.json();
   truth["left_opening"] = twin.left_opening;
   truth["right_opening"] = twin.right_opening;
   truth["leak"] = twin.leak;
-  truth["hidden"] = errors.physics.words();
   truth["flow_factor"] = errors.flow_factor;
   truth["flow_delay_s"] = errors.flow_delay;
-  truth["pull_m_s2"] = {errors.physics.pull.x(), errors.physics.pull.y(), errors.physics.pull.z()};
-  truth["drag_1_s"] = errors.physics.drag;
-  truth["kinematic_viscosity_m2_s"] = errors.physics.kinematic_viscosity;
   truth["solver"] = solver_name;
   truth["seed"] = twin.seed;
   truth["spacing_mm"] = 1e3 * twin.spacing;

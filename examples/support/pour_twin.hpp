@@ -236,23 +236,13 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   const int frames = static_cast<int>(std::lround(twin.duration * twin.frames_per_second));
   for (int frame = 0; frame < frames; ++frame) {
     const double time = frame / twin.frames_per_second;
-    StepReport report = reality.step(std::max(0.0, start + time - reality.time()));
-    if (!report.advanced()) {
-      throw std::runtime_error("the reality stopped at " + std::to_string(time) +
-                               " s: " + std::string(to_string(report.status)));
-    }
+    const StepReport report = step_reality(reality, start + time, time);
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
     recorder.add_frame(reality, {{motion.at(std::max(0.0, time - hidden.latency)), 1}, {Pose{}, 0.5}});
     progress(static_cast<double>(frame + 1) / frames);
   }
-  nlohmann::json truth;
-  truth["hidden"] = hidden.words();
-  truth["pull_m_s2"] = {hidden.pull.x(), hidden.pull.y(), hidden.pull.z()};
-  truth["drag_1_s"] = hidden.drag;
-  truth["sticky_walls"] = hidden.sticky_walls;
-  truth["kinematic_viscosity_m2_s"] = hidden.kinematic_viscosity;
-  truth["latency_s"] = hidden.latency;
+  nlohmann::json truth = hidden.json();
   truth["solver"] = solver_name;
   truth["seed"] = twin.seed;
   truth["spacing_mm"] = 1e3 * twin.spacing;

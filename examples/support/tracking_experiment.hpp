@@ -53,12 +53,8 @@ inline std::vector<Pour> harmless_pours() {
 }
 
 inline std::vector<Pour> pours_named(const std::vector<std::string>& names) {
-  std::vector<Pour> chosen;
-  for (const Pour& each : paper_pours()) {
-    if (std::find(names.begin(), names.end(), each.name) != names.end()) {
-      chosen.push_back(each);
-    }
-  }
+  std::vector<Pour> chosen = paper_pours();
+  keep_pours(chosen, names);
   return chosen;
 }
 
@@ -296,13 +292,7 @@ class TrackingExperiment {
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
   /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(std::vector<Pour> pours) {
-    for (Pour& each : pours) {
-      each.twin.spacing = options_.reality_spacing;
-      each.twin.duration = options_.duration;
-    }
-    folder_.record(pours);
-  }
+  void record(const std::vector<Pour>& pours) { folder_.record(pours, options_.reality_spacing, options_.duration); }
 
   /// Runs what is not there yet; afterwards all have a result().
   void run(const std::vector<TrackingJob>& jobs) {

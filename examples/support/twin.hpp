@@ -12,10 +12,13 @@
 #include <filesystem>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/camera/posed_camera.hpp>
@@ -52,6 +55,15 @@ struct HiddenPhysics {
     if (latency > 0)
       say("late poses");
     return text.empty() ? "nothing" : text;
+  }
+
+  nlohmann::json json() const {
+    return {{"hidden", words()},
+            {"pull_m_s2", {pull.x(), pull.y(), pull.z()}},
+            {"drag_1_s", drag},
+            {"sticky_walls", sticky_walls},
+            {"kinematic_viscosity_m2_s", kinematic_viscosity},
+            {"latency_s", latency}};
   }
 };
 
@@ -113,6 +125,18 @@ inline decant::Pose off_by(const decant::Pose& pose, double millimetres, double 
       decant::Vector3<double>(normal(random), normal(random), normal(random)).normalized();
   return {Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis) * pose.rotation,
           pose.translation + 1e-3 * millimetres * step};
+}
+
+/// Takes a reality to a time on its clock. @param recorded the same on the recording's, for what is thrown:
+/// std::runtime_error where it cannot go on. [s]
+template <class Model>
+decant::StepReport step_reality(Model& reality, double time, double recorded) {
+  const decant::StepReport report = reality.step(std::max(0.0, time - reality.time()));
+  if (!report.advanced()) {
+    throw std::runtime_error("the reality stopped at " + std::to_string(recorded) +
+                             " s: " + std::string(to_string(report.status)));
+  }
+  return report;
 }
 
 /// How a recording goes wrong.

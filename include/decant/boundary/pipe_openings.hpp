@@ -424,21 +424,31 @@ inline std::optional<PipeSection> opening_at(const BoundingVolumeHierarchy& surf
   return rim;
 }
 
-/// A dead end with so little room, beside the largest, is a dent.
-inline bool is_small(std::size_t room_size, std::size_t largest) { return 20 * room_size < largest; }
+/// Which of the rooms behind some patches or openings are dents: dead ends with little room beside the largest.
+class Dents {
+ public:
+  /// @param room_of gives the number of the room behind each. @param room_size cubes of each room.
+  Dents(const auto& ways_in, const std::vector<std::size_t>& room_size, auto room_of)
+      : room_size_(room_size), ways_(room_size.size(), 0) {
+    for (const auto& way : ways_in) {
+      largest_ = std::max(largest_, room_size[room_of(way)]);
+      ++ways_[room_of(way)];
+    }
+  }
+  bool dead_end(std::size_t room) const { return ways_[room] == 1; }
+  bool dent(std::size_t room) const { return dead_end(room) && 20 * room_size_[room] < largest_; }
+
+ private:
+  const std::vector<std::size_t>& room_size_;
+  std::vector<int> ways_;
+  std::size_t largest_ = 0;
+};
 
 /// The largest patches, without those of dents: a rough surface has thousands, which would take minutes.
 inline std::vector<AirPatch> worth_a_look(std::vector<AirPatch> patches, const std::vector<std::size_t>& room_size) {
   constexpr std::size_t most = 64;
-  std::size_t largest = 0;
-  std::vector<int> ways(room_size.size(), 0);
-  for (const AirPatch& patch : patches) {
-    largest = std::max(largest, room_size[patch.room]);
-    ++ways[patch.room];
-  }
-  const auto dent = [&](const AirPatch& patch) {
-    return ways[patch.room] == 1 && is_small(room_size[patch.room], largest);
-  };
+  const Dents dents(patches, room_size, [](const AirPatch& patch) { return patch.room; });
+  const auto dent = [&](const AirPatch& patch) { return dents.dent(patch.room); };
   patches.erase(std::remove_if(patches.begin(), patches.end(), dent), patches.end());
   std::stable_sort(patches.begin(), patches.end(),
                    [](const AirPatch& a, const AirPatch& b) { return a.normal.norm() > b.normal.norm(); });
@@ -449,18 +459,10 @@ inline std::vector<AirPatch> worth_a_look(std::vector<AirPatch> patches, const s
 /// Takes out dead ends that are no pipes. @param room_size cubes of each room, by PipeOpening::passage.
 inline void leave_out_dents(const BoundingVolumeHierarchy& surface, const std::vector<std::size_t>& room_size,
                             std::vector<PipeOpening>& openings) {
-  std::size_t largest = 0;
-  std::vector<int> ways(room_size.size(), 0);
-  for (const PipeOpening& opening : openings) {
-    largest = std::max(largest, room_size[opening.passage]);
-    ++ways[opening.passage];
-  }
+  const Dents dents(openings, room_size, [](const PipeOpening& opening) { return opening.passage; });
   const auto is_dent = [&](const PipeOpening& opening) {
-    if (ways[opening.passage] > 1) {
-      return false;
-    }
-    if (is_small(room_size[opening.passage], largest)) {
-      return true;
+    if (!dents.dead_end(opening.passage) || dents.dent(opening.passage)) {
+      return dents.dent(opening.passage);
     }
     // 0.53 in a corner of three walls, 0.62 in a bowl whose depth is five eighths of its rim's radius
     const auto inside = follow_pipe(surface, opening.rim, 0.3 * opening.rim.radius());

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What the tools' command lines share.
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "result_file.hpp"
+
+namespace example {
+
+/// Reads the command line, then does the work. What is wrong with either is said in one line.
+/// @param work returns the exit status. @return that, or 2 where an argument, a file or the work's input is refused.
+inline int run_tool(CLI::App& app, int count, char** values, const std::function<int()>& work) {
+  app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
+  try {
+    app.parse(count, values);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    return work();
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  }
+}
+
+/// Throws std::runtime_error unless each file that is asked for, by a name that is not empty, can be written.
+inline void expect_writable(std::initializer_list<std::string> files) {
+  for (const std::string& file : files) {
+    if (!file.empty()) {
+      expect_writable(std::filesystem::path(file));
+    }
+  }
+}
+
+}  // namespace example
