@@ -5,11 +5,9 @@
 /// computed twice, and a run that was stopped goes on where it was.
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -18,12 +16,13 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
 
+#include <decant/core/parallel.hpp>
+#include <decant/core/types.hpp>
 #include <decant/io/detail/folder.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/progress.hpp>
@@ -71,37 +70,6 @@ inline void keep_pours(std::vector<Pour>& pours, const std::vector<std::string>&
   std::erase_if(pours, [&](const Pour& each) {
     return !names.empty() && std::find(names.begin(), names.end(), each.name) == names.end();
   });
-}
-
-/// Calls work(k) for each k from 0 to count - 1 from several threads. The first exception lets no more begin, and is
-/// thrown when all that run have ended.
-inline void side_by_side(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
-  const unsigned wanted =
-      threads > 0 ? static_cast<unsigned>(threads) : std::max(1U, std::thread::hardware_concurrency());
-  std::atomic<std::size_t> next{0};
-  std::exception_ptr failure;
-  std::mutex guard;
-  const auto loop = [&] {
-    for (std::size_t k = next++; k < count; k = next++) {
-      try {
-        work(k);
-      } catch (...) {
-        const std::lock_guard lock(guard);
-        failure = failure ? failure : std::current_exception();
-        next = count;
-      }
-    }
-  };
-  std::vector<std::thread> workers;
-  for (unsigned k = 0; k < std::min<std::size_t>(wanted, count); ++k) {
-    workers.emplace_back(loop);
-  }
-  for (std::thread& worker : workers) {
-    worker.join();
-  }
-  if (failure) {
-    std::rethrow_exception(failure);
-  }
 }
 
 /// Something to be computed, and what its result depends on beside the program.
@@ -153,7 +121,8 @@ class ExperimentFolder {
     TogetherProgress progress("recording", missing.size());
     // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
     const std::filesystem::path unfinished = folder_ / "unfinished";
-    side_by_side(missing.size(), threads_, [&](std::size_t k) {
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index job) {
+      const auto k = static_cast<std::size_t>(job);
       const std::filesystem::path part = unfinished / missing[k].name;
       decant::detail::make_folder(unfinished);
       std::filesystem::remove_all(part);
@@ -183,7 +152,8 @@ class ExperimentFolder {
     }
     TogetherProgress progress(label, missing.size());
     std::mutex guard;
-    side_by_side(missing.size(), threads_, [&](std::size_t k) {
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index job) {
+      const auto k = static_cast<std::size_t>(job);
       const ExperimentJob& job = *missing[k];
       nlohmann::json result = job.compute([&](double share) { progress.update(k, share); });
       progress.update(k, 1);  // also where it stopped early

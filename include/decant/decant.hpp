@@ -77,9 +77,11 @@
 #include <decant/force/viscosity.hpp>
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
+#include <decant/hypothesis/executor.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/hypothesis/independent_groups.hpp>
 #include <decant/hypothesis/posterior.hpp>
+#include <decant/hypothesis/thread_executor.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>

@@ -6,7 +6,9 @@
 /// sums of fixed blocks in a fixed order.
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
+#include <exception>
 #include <vector>
 
 #ifdef _OPENMP
@@ -81,6 +83,46 @@ void parallel_for(Index count, Threads threads, Function&& f) {
       f(i);
     }
   });
+}
+
+/// Calls f(k) for k in [0, count), pieces of work that take long and differ in how long: whichever thread is free takes
+/// the next. f may throw: then no more begin, and of what was thrown that of the lowest k is thrown again when all that
+/// run have ended.
+template <class Function>
+void parallel_jobs(Index count, Threads threads, Function&& f) {
+  std::atomic<bool> failed{false};
+  std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(std::max<Index>(count, 0)));
+  const auto guarded = [&](Index k) noexcept {
+    if (!failed) {
+      try {
+        f(k);
+      } catch (...) {
+        thrown[static_cast<std::size_t>(k)] = std::current_exception();
+        failed = true;
+      }
+    }
+  };
+#ifdef _OPENMP
+  const int workers = static_cast<int>(std::min<Index>(threads.resolved(), count));
+  if (workers > 1) {
+#pragma omp parallel for schedule(dynamic, 1) num_threads(workers)
+    for (Index k = 0; k < count; ++k) {
+      guarded(k);
+    }
+  } else
+#else
+  (void)threads;
+#endif
+  {
+    for (Index k = 0; k < count; ++k) {
+      guarded(k);
+    }
+  }
+  for (const std::exception_ptr& exception : thrown) {
+    if (exception) {
+      std::rethrow_exception(exception);
+    }
+  }
 }
 
 /// Scratch memory of reductions; keep one beside the data, so that nothing is allocated in a loop.
