@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// What experiments on twins of pours share: their recordings and results are kept in a folder, so that nothing is
-/// computed twice, and a run that was stopped goes on where it was.
+/// What experiments on twins share: their recordings and results are kept in a folder, so that nothing is computed
+/// twice, and a run that was stopped goes on where it was.
 
 #include <algorithm>
 #include <cmath>
@@ -28,49 +28,18 @@
 #include <decant/io/progress.hpp>
 #include <decant/io/recording_truth.hpp>
 
-#include "pour_twin.hpp"
 #include "result_file.hpp"
 
 namespace example {
 
-/// A recording of the experiment: its folder's name and how it is made.
-struct Pour {
-  std::string name;
-  PourTwin twin;
-};
-
-inline Pour pour(const std::string& prefix, const std::string& container, int percent, std::uint32_t seed) {
-  PourTwin twin;
-  twin.container = container;
-  twin.fill_fraction = 0.01 * percent;
-  twin.seed = seed;
-  return {prefix + container + "_" + std::to_string(percent) + "_" + std::to_string(seed), twin};
-}
-
-/// The paper's: cup and bottle, three amounts, two trials each.
-inline std::vector<Pour> paper_pours() {
-  std::vector<Pour> pours;
+/// A recording of an experiment, and how it is made.
+struct ExperimentRecording {
+  std::string name;  ///< of its folder
   std::uint32_t seed = 0;
-  for (const char* container : {"cup", "bottle"}) {
-    for (const int percent : {30, 60, 90}) {
-      for (int trial = 0; trial < 2; ++trial) {
-        pours.push_back(pour("", container, percent, ++seed));
-      }
-    }
-  }
-  return pours;
-}
-
-inline bool has_pour(const std::vector<Pour>& pours, const std::string& name) {
-  return std::any_of(pours.begin(), pours.end(), [&](const Pour& each) { return each.name == name; });
-}
-
-/// Those of the names; all if there are no names.
-inline void keep_pours(std::vector<Pour>& pours, const std::vector<std::string>& names) {
-  std::erase_if(pours, [&](const Pour& each) {
-    return !names.empty() && std::find(names.begin(), names.end(), each.name) == names.end();
-  });
-}
+  double spacing = 0;      ///< of the reality's particles [m]
+  std::size_t frames = 0;  ///< how many it has
+  std::function<void(const std::filesystem::path& folder, const std::function<void(double)>& progress)> make{};
+};
 
 /// Something to be computed, and what its result depends on beside the program.
 struct ExperimentJob {
@@ -92,42 +61,39 @@ class ExperimentFolder {
     std::filesystem::remove(probe);
   }
 
-  std::filesystem::path recording(const Pour& pour) const { return folder_ / pour.name; }
+  std::filesystem::path recording(const std::string& name) const { return folder_ / name; }
 
   /// What only a score may look at. Throws std::runtime_error where there is none.
-  nlohmann::json truth(const Pour& pour) const {
-    const std::optional<std::string> text = decant::read_truth(recording(pour));
+  nlohmann::json truth(const std::string& name) const {
+    const std::optional<std::string> text = decant::read_truth(recording(name));
     if (!text) {
-      throw std::runtime_error((recording(pour) / "recording.json").string() +
+      throw std::runtime_error((recording(name) / "recording.json").string() +
                                ": truth is missing, which the scores need");
     }
     return nlohmann::json::parse(*text);
   }
 
   /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
-  /// is there and was made otherwise. @param spacing of the reality's particles [m]. @param duration [s].
-  void record(const std::vector<Pour>& pours, double spacing, double duration) {
-    std::vector<Pour> missing;
-    for (Pour each : pours) {
-      each.twin.threads = 1;
-      each.twin.spacing = spacing;
-      each.twin.duration = duration;
-      if (std::filesystem::exists(recording(each))) {
+  /// is there and was made otherwise.
+  void record(const std::vector<ExperimentRecording>& recordings) {
+    std::vector<const ExperimentRecording*> missing;
+    for (const ExperimentRecording& each : recordings) {
+      if (std::filesystem::exists(recording(each.name))) {
         expect_made_as(each);
       } else {
-        missing.push_back(std::move(each));
+        missing.push_back(&each);
       }
     }
     TogetherProgress progress("recording", missing.size());
     // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
     const std::filesystem::path unfinished = folder_ / "unfinished";
-    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index job) {
-      const auto k = static_cast<std::size_t>(job);
-      const std::filesystem::path part = unfinished / missing[k].name;
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index number) {
+      const auto k = static_cast<std::size_t>(number);
+      const std::filesystem::path part = unfinished / missing[k]->name;
       decant::detail::make_folder(unfinished);
       std::filesystem::remove_all(part);
-      record_pour(missing[k].twin, part, [&](double share) { progress.update(k, share); });
-      std::filesystem::rename(part, recording(missing[k]));
+      missing[k]->make(part, [&](double share) { progress.update(k, share); });
+      std::filesystem::rename(part, recording(missing[k]->name));
     });
     std::error_code not_empty;
     std::filesystem::remove(unfinished, not_empty);
@@ -152,8 +118,8 @@ class ExperimentFolder {
     }
     TogetherProgress progress(label, missing.size());
     std::mutex guard;
-    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index job) {
-      const auto k = static_cast<std::size_t>(job);
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index number) {
+      const auto k = static_cast<std::size_t>(number);
       const ExperimentJob& job = *missing[k];
       nlohmann::json result = job.compute([&](double share) { progress.update(k, share); });
       progress.update(k, 1);  // also where it stopped early
@@ -207,18 +173,18 @@ class ExperimentFolder {
                : nlohmann::json();
   }
 
-  void expect_made_as(const Pour& wanted) const {
-    const nlohmann::json there = truth(wanted);
-    const auto frames = there.at("volume_ml").at("pan").size();
-    const auto wanted_frames = std::lround(wanted.twin.duration * wanted.twin.frames_per_second);
-    const auto words = [](const std::string& seed, double spacing_mm, auto count) {
-      return "seed " + seed + ", " + decant::detail::number_text(spacing_mm) + " mm, " + std::to_string(count) +
+  void expect_made_as(const ExperimentRecording& wanted) const {
+    const nlohmann::json there = truth(wanted.name);
+    const auto words = [](const std::string& seed, double spacing_mm, std::size_t frames) {
+      return "seed " + seed + ", " + decant::detail::number_text(spacing_mm) + " mm, " + std::to_string(frames) +
              " frames";
     };
-    const std::string is = words(there.at("seed").dump(), there.at("spacing_mm").get<double>(), frames);
-    const std::string should_be = words(std::to_string(wanted.twin.seed), 1e3 * wanted.twin.spacing, wanted_frames);
+    const nlohmann::json& volumes = there.at("volume_ml");  // of each container, by frame
+    const std::string is = words(there.at("seed").dump(), there.at("spacing_mm").get<double>(),
+                                 volumes.empty() ? 0 : volumes.begin()->size());
+    const std::string should_be = words(std::to_string(wanted.seed), 1e3 * wanted.spacing, wanted.frames);
     if (is != should_be) {
-      decant::detail::refuse_file(recording(wanted).string() + ": the recording that is there", should_be, is);
+      decant::detail::refuse_file(recording(wanted.name).string() + ": the recording that is there", should_be, is);
     }
   }
 

@@ -3,7 +3,9 @@
 
 /// Tables and charts of an experiment, for terminals, scripts and browsers.
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -15,6 +17,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <decant/io/detail/text.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/table.hpp>
 
@@ -51,6 +54,22 @@ inline double mean_of(const std::vector<double>& values) {
     count += std::isfinite(value) ? 1 : 0;
   }
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+inline double median_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.empty()           ? std::numeric_limits<double>::quiet_NaN()
+         : values.size() % 2 == 1 ? values[half]
+                                  : 0.5 * (values[half - 1] + values[half]);
+}
+
+inline std::string percent_text(double share, int digits = 1) {
+  return std::isfinite(share) ? decant::detail::fixed_text(100 * share, digits) : "-";
+}
+
+inline std::string count_text(std::size_t count, std::size_t of) {
+  return std::to_string(count) + " of " + std::to_string(of);
 }
 
 }  // namespace detail

@@ -19,6 +19,7 @@
 
 #include "experiment_folder.hpp"
 #include "fill_estimate.hpp"
+#include "pours.hpp"
 
 namespace example {
 
@@ -63,7 +64,9 @@ class FillExperiment {
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
   /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<Pour>& pours) { folder_.record(pours, options_.reality_spacing, options_.duration); }
+  void record(const std::vector<Pour>& pours) {
+    folder_.record(recordings_of(pours, options_.reality_spacing, options_.duration));
+  }
 
   /// Estimates what is not there yet. @param methods that choose from levels, see FillOptions.
   void run(const std::vector<Pour>& pours, const std::vector<std::string>& methods) {
@@ -99,11 +102,11 @@ class FillExperiment {
     options.grid_step = options_.grid_step;
     options.tracking.spacing = options_.model_spacing;
     options.tracking.threads = 1;
-    const FillResult result = estimate_fill(decant::read_recording(folder_.recording(pour)), options,
+    const FillResult result = estimate_fill(decant::read_recording(folder_.recording(pour.name)), options,
                                             [&](const std::string&, double share) { progress(share); });
     nlohmann::json json = fill_json(result, options.confidence);
     json["true_percent"] = std::lround(100 * pour.twin.fill_fraction);
-    json["true_ml"] = folder_.truth(pour).at("initial_ml");
+    json["true_ml"] = folder_.truth(pour.name).at("initial_ml");
     return json;
   }
 

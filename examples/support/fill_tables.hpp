@@ -69,22 +69,6 @@ inline std::vector<FillCase> cases_where(const std::vector<FillCase>& cases, aut
   return chosen;
 }
 
-inline double median_of(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const std::size_t half = values.size() / 2;
-  return values.empty()           ? std::numeric_limits<double>::quiet_NaN()
-         : values.size() % 2 == 1 ? values[half]
-                                  : 0.5 * (values[half - 1] + values[half]);
-}
-
-inline std::string percent_text(double share, int digits = 1) {
-  return std::isfinite(share) ? decant::detail::fixed_text(100 * share, digits) : "-";
-}
-
-inline std::string count_text(std::size_t count, std::size_t of) {
-  return std::to_string(count) + " of " + std::to_string(of);
-}
-
 inline double mean_probability(const std::vector<FillCase>& cases, const std::string& method) {
   std::vector<double> values;
   for (const FillCase& each : cases) {

@@ -4,6 +4,11 @@
 /// A twin of the pipe junction of Schenck and Fox (2017), their third experiment: an inverted T whose legs bend down
 /// over two bowls, into which a litre pours as from a container that is tilted steadily. What blocks a leg is inside,
 /// where no camera sees.
+///
+/// Only where legs are what limits the flow does it say how much of one is open. So legs are slim (each takes about as
+/// much as comes to it, at the few centimetres of head that two open ones leave in the stem), the stem is wide and so
+/// high that it does not run over when one leg has to take all, and the inlet is just above the legs: a jet that falls
+/// from the top of the stem would have speed enough for any leg.
 
 #include <algorithm>
 #include <array>
@@ -46,7 +51,7 @@ struct JunctionTwin {
   bool noisy_poses = true;
   bool noisy_masks = true;
   double spacing = 0.0035;  ///< of the reality's particles [m]
-  double duration = 4;      ///< [s]
+  double duration = 3.2;    ///< [s]
   double frames_per_second = 30;
   int threads = 0;  ///< 0: all; the recording does not depend on it
 };
@@ -89,28 +94,36 @@ inline JunctionErrors draw_junction_errors(const JunctionTwin& twin) {
   return errors;
 }
 
+/// Radius of a leg's bore [m].
+inline constexpr double junction_leg_radius = 0.0105;
+
 /// A leg that is blocked has a bore that narrows and widens again at once, about a place that the seed draws.
 inline decant::PipeNetwork junction_pipes(const JunctionTwin& twin) {
   std::mt19937 random(389 * twin.seed + 7);
   decant::PipeNetwork pipes;
-  pipes.radius = 0.012;
-  pipes.places = {{0, 0.34}, {-0.13, 0.175}, {0.13, 0.175}, {0, 0.18}, {-0.13, 0.125}, {0.13, 0.125}};
+  pipes.radius = 0.018;  // of the stem
+  pipes.places = {{0, 0.46}, {-0.13, 0.175}, {0.13, 0.175}, {0, 0.18}, {-0.13, 0.155}, {0.13, 0.155}};
   pipes.pipes = {{0, 3}, {3, 1}, {3, 2}, {1, 4}, {2, 5}};
+  const double slim = junction_leg_radius / pipes.radius;
   for (const std::size_t leg : {std::size_t{1}, std::size_t{2}}) {
     const double opening = leg == 1 ? twin.left_opening : twin.right_opening;
-    const double place = std::uniform_real_distribution<double>(0.35, 0.75)(random);
+    const double place = std::uniform_real_distribution<double>(0.4, 0.75)(random);
+    auto& bore = pipes.pipes[leg].bore;
+    bore = {{0, 1}, {0.2, slim}};
     if (opening < 1) {
       // a bore that is nothing would have walls of no thickness: less than any particle passes
-      const double bore = std::max(std::sqrt(opening), 0.02);
-      pipes.pipes[leg].bore = {{0, 1}, {place - 0.06, 1}, {place - 0.05, bore}, {place + 0.05, bore}, {place + 0.06, 1},
-                               {1, 1}};
+      const double narrow = slim * std::max(std::sqrt(opening), 0.02);
+      bore.insert(bore.end(),
+                  {{place - 0.06, slim}, {place - 0.05, narrow}, {place + 0.05, narrow}, {place + 0.06, slim}});
     }
+    bore.emplace_back(1, slim);
+    pipes.pipes[leg + 2].bore = {{0, slim}, {1, slim}};
   }
   if (twin.leak > 0) {
     // a window below: length times width
-    const double area = twin.leak * pipes.bore_area(), width = 0.012;
+    const double area = twin.leak * std::numbers::pi * junction_leg_radius * junction_leg_radius, width = 0.012;
     const double share = area / width / std::hypot(0.13, 0.005);
-    pipes.holes = {{1, 0.5 - share / 2, 0.5 + share / 2, std::numbers::pi / 2, width / pipes.radius}};
+    pipes.holes = {{1, 0.5 - share / 2, 0.5 + share / 2, std::numbers::pi / 2, width / junction_leg_radius}};
   }
   return pipes;
 }
@@ -141,9 +154,9 @@ inline std::vector<std::pair<double, double>> litre_from_tilted_cube(double begi
 /// @param errors those of the reality; none for what the recording says.
 inline decant::InletSettings junction_inlet(const JunctionErrors& errors) {
   decant::InletSettings inlet;
-  inlet.position = {0, 0, 0.325};
-  inlet.radius = 0.009;
-  inlet.flow = litre_from_tilted_cube(0.3, 3.2);
+  inlet.position = {0, 0, 0.207};
+  inlet.radius = 0.015;
+  inlet.flow = litre_from_tilted_cube(0.3, 2.3);
   for (auto& [time, flow] : inlet.flow) {
     time += errors.flow_delay;
     flow *= errors.flow_factor;

@@ -32,6 +32,7 @@
 
 #include "experiment_folder.hpp"
 #include "pour_twin.hpp"
+#include "pours.hpp"
 #include "result_file.hpp"
 #include "tracking_methods.hpp"
 #include "tracking_run.hpp"
@@ -292,7 +293,9 @@ class TrackingExperiment {
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
   /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<Pour>& pours) { folder_.record(pours, options_.reality_spacing, options_.duration); }
+  void record(const std::vector<Pour>& pours) {
+    folder_.record(recordings_of(pours, options_.reality_spacing, options_.duration));
+  }
 
   /// Runs what is not there yet; afterwards all have a result().
   void run(const std::vector<TrackingJob>& jobs) {
@@ -374,8 +377,8 @@ class TrackingExperiment {
   }
 
   nlohmann::json compute(const TrackingJob& job, const std::function<void(double)>& progress) {
-    const std::filesystem::path folder = folder_.recording(job.pour), truth_masks = folder / "truth_mask";
-    const nlohmann::json truth = folder_.truth(job.pour);
+    const std::filesystem::path folder = folder_.recording(job.pour.name), truth_masks = folder / "truth_mask";
+    const nlohmann::json truth = folder_.truth(job.pour.name);
     decant::Recording recording = decant::read_recording(folder);
     const auto frames = static_cast<double>(recording.frames);
     const auto progressed = [&](std::size_t done) { progress(static_cast<double>(done) / frames); };

@@ -28,8 +28,8 @@ struct PipeNetwork {
   /// A straight pipe from one place to another.
   struct Pipe {
     std::size_t from = 0, to = 0;
-    /// Bore over that of the network along the way: (share of the way, factor), linear in between. Where pipes meet it
-    /// has to be 1.
+    /// Bore over that of the network along the way: (share of the way, factor), linear in between. Where pipes meet
+    /// they have to have the same, 1 unless said otherwise.
     std::vector<std::pair<double, double>> bore{};
   };
 

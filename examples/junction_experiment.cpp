@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+// What blocks a pipe junction: the third experiment of Schenck and Fox (2017) on twins of their junction:
+//   junction_experiment FOLDER --json OUT.json --report OUT.html
+// Recordings and results are kept in the folder: a run that was stopped goes on where it was, another only prints.
+// Exit status 0: done; 1: a recording could not be followed to its end; 2: a recording, a file or an argument is wrong.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "support/experiment_report.hpp"
+#include "support/junction_experiment.hpp"
+#include "support/junction_tables.hpp"
+#include "support/result_file.hpp"
+#include "support/tool.hpp"
+
+namespace {
+
+/// Those of the names; all if there are no names. @return how many of the names were there.
+std::size_t keep(std::vector<example::JunctionCase>& cases, const std::vector<std::string>& names) {
+  const std::size_t before = cases.size();
+  std::erase_if(cases, [&](const auto& each) {
+    return !names.empty() && std::find(names.begin(), names.end(), each.name) == names.end();
+  });
+  return names.empty() ? before : cases.size();
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  std::string folder, json_file, report_file, set = "all";
+  std::vector<std::string> only, methods{example::default_method};
+  example::JunctionExperimentOptions options;
+  double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
+  bool keep_all = false;
+  CLI::App app("Finds what blocks pipe junctions by what runs out of them, and scores the answers.");
+  app.add_option("folder", folder, "where recordings and results are kept")->required();
+  app.add_option("--set", set,
+                 "configurations: the paper's five, four trials each, by each method; openings: one leg 10 to 90 % "
+                 "open; others: what is none of the five; all: these three")
+      ->check(CLI::IsMember({"configurations", "openings", "others", "all"}));
+  app.add_option("--methods", methods, "for the configurations, several by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(example::weighing_methods()));
+  app.add_option("--only", only, "recordings of the set, such as pipe_left_1, several by commas")->delimiter(',');
+  app.add_option("--threads", options.threads, "runs side by side, each on one thread; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--json", json_file, "writes results and tables");
+  app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
+  app.add_flag("--keep-all", keep_all,
+               "gives up no hypothesis, to see what giving up saves and whether it changes answers");
+  app.add_flag("--again", options.again, "computes results that are there already anew; recordings are kept");
+  // smaller recordings, for tests; group "" is not in the help
+  app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
+  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
+  app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(0.0, 20.0))->group("");
+  return example::run_tool(app, count, values, [&] {
+    options.folder = folder;
+    options.reality_spacing = 1e-3 * reality_mm;
+    options.model_spacing = 1e-3 * model_mm;
+    options.least_probability = keep_all ? 0 : options.least_probability;
+    example::expect_writable({json_file, report_file});
+    const auto chosen = [&](const char* name, std::vector<example::JunctionCase> cases) {
+      return set == "all" || set == name ? cases : std::vector<example::JunctionCase>();
+    };
+    auto configurations = chosen("configurations", example::junction_configurations());
+    auto openings = chosen("openings", example::junction_openings());
+    auto others = chosen("others", example::junction_others());
+    const std::size_t recordings = keep(configurations, only) + keep(openings, only) + keep(others, only);
+    if (!only.empty() && recordings != only.size()) {
+      throw std::runtime_error("--only: the experiment has " + std::to_string(recordings) + " of the " +
+                               std::to_string(only.size()) + " recordings that are named");
+    }
+    if (std::find(methods.begin(), methods.end(), example::default_method) == methods.end()) {
+      methods.push_back(example::default_method);
+    }
+    example::JunctionExperiment experiment(options);
+    for (const auto* cases : {&configurations, &openings, &others}) {
+      experiment.record(*cases);
+      experiment.run(*cases, cases == &configurations ? methods : std::vector<std::string>{example::default_method});
+    }
+    auto sections = example::junction_tables(experiment, configurations, openings, others, methods);
+    const auto& results = experiment.folder().results();
+    for (auto& section : example::failures_of(results)) {
+      sections.push_back(std::move(section));
+    }
+    example::print_sections(sections);
+    std::printf("%zu of %zu recordings made, %zu of %zu results computed\n", experiment.folder().recorded(), recordings,
+                experiment.folder().computed(), experiment.folder().asked());
+    if (!json_file.empty()) {
+      nlohmann::json json;
+      json["results"] = results;
+      json["tables"] = example::sections_json(sections);
+      example::write_result(json_file, json);
+    }
+    if (!report_file.empty()) {
+      example::write_experiment_report(report_file, "What blocks the junction",
+                                       std::to_string(recordings) +
+                                           (recordings == 1 ? " recording of " : " recordings of ") +
+                                           decant::detail::fixed_text(options.duration, 1) + " s; particles of " +
+                                           decant::detail::fixed_text(reality_mm, 1) +
+                                           " mm in reality, and five of them across a leg in the model. What blocks a "
+                                           "leg is hidden from the answers.",
+                                       sections);
+    }
+    return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
+               ? 1
+               : 0;
+  });
+}
