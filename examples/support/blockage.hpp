@@ -30,7 +30,7 @@ namespace example {
 struct BlockageOptions {
   std::string method = default_method;
   /// Of a leg that is blocked in part, those that are tried, increasing between 0 and 1; 0 and 1 are in any case.
-  std::vector<double> openings{0.2, 0.4, 0.6};
+  std::vector<double> openings{0.2, 0.4, 0.6, 0.8};
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
   TrackingOptions tracking{};
@@ -96,9 +96,13 @@ inline std::vector<JunctionLeg> junction_legs(const decant::Recording& recording
   std::vector<JunctionLeg> legs;
   for (const PipeOpening& opening : openings) {
     const double radius = opening.rim.radius();
-    // half-way to where the leg bends or branches; in a short one just behind its rim
-    const std::vector<PipeSection> line = center_line(surface, opening.rim, 20 * radius, 0.25 * radius);
-    JunctionLeg leg{"leg_" + std::to_string(legs.size() + 1), line[line.size() / 2]};
+    // Half-way to where the leg branches, through its corners: how much passes depends on where a leg is blocked, most
+    // of all on whether there is pipe behind it, and that is so along most of its way.
+    const std::vector<PipeSection> line = center_line(surface, opening.rim, 100 * radius, 0.25 * radius);
+    const auto half_way = std::find_if(line.begin(), line.end(), [&](const PipeSection& section) {
+      return section.distance >= 0.5 * line.back().distance;
+    });
+    JunctionLeg leg{"leg_" + std::to_string(legs.size() + 1), *half_way};
     if (openings.size() == 2) {
       leg.name = legs.empty() ? "left" : "right";
     }

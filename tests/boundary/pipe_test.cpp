@@ -98,6 +98,46 @@ TEST_CASE("pipe openings: cups have one; what has no inside has none") {
   CHECK_THROWS_WITH(decant::find_pipe_openings(decant::TriangleMesh{}), decant_test::contains("number of triangles"));
 }
 
+TEST_CASE("pipe section: goes around a sharp corner, but not into a branch or through an end") {
+  PipeNetwork pipes;
+  pipes.radius = 0.01;
+  pipes.places = {{0, 0}, {0, 0.1}, {0.15, 0.11}, {0.15, 0.0}, {0.15, 0.2}};
+  pipes.pipes = {{0, 1}, {1, 2}, {2, 3}, {2, 4}};
+  const decant::BoundingVolumeHierarchy surface(pipes.mesh());
+  std::vector<PipeOpening> openings = decant::find_pipe_openings(surface);
+  REQUIRE(openings.size() == 3);
+  const decant::PipeSection& rim = openings.front().rim;  // sorted by x: the one at the origin
+  REQUIRE(rim.center.norm() < 1e-3);
+  const auto line = decant::center_line(surface, rim, 1, 0.004);
+  const double to_corner = 0.1, to_branch = to_corner + std::hypot(0.15, 0.01);
+  CHECK(line.back().distance < to_branch);
+  CHECK(line.back().distance > to_branch - 0.03);
+  std::size_t before = 0, behind = 0;
+  for (const decant::PipeSection& section : line) {
+    CHECK(section.area == Approx(pipes.bore_area()).epsilon(0.05));
+    const bool in_first = section.center.z() < 0.085;
+    (in_first ? before : behind) += 1;
+    // the middle of the first or of the second pipe, and so far along it as the distance says
+    const Place way = Place(0.15, 0, 0.01).normalized(), corner(0, 0, to_corner);
+    const Place expected = section.distance < to_corner ? Place(0, 0, section.distance)
+                                                        : Place(corner + (section.distance - to_corner) * way);
+    CHECK((section.center - expected).norm() < 0.35 * pipes.radius);
+  }
+  CHECK(before >= 15);
+  CHECK(behind >= 20);
+  // into the branch from the side
+  CHECK_FALSE(decant::behind_corner(surface, line.back()));
+  // a pipe that ends
+  PipeNetwork dead_end;
+  dead_end.radius = 0.01;
+  dead_end.places = {{0, 0}, {0, 0.1}};
+  dead_end.pipes = {{0, 1, {{0, 1}, {0.9, 1}, {0.91, 0.02}, {1, 0.02}}}};
+  const decant::BoundingVolumeHierarchy closed(dead_end.mesh());
+  const auto inside = decant::pipe_section(closed, {0, 0, 0.08}, {0, 0, -1}, 0.05);
+  REQUIRE(inside);
+  CHECK_FALSE(decant::behind_corner(closed, *inside));
+}
+
 TEST_CASE("pipe section: follows a leg to where it branches, and no farther") {
   PipeNetwork tee = inverted_tee(PipeNetwork::Bore::Round);
   tee.pipes[1].bore = {{0, 1}, {0.2, 1}, {0.4, 0.8}, {0.6, 0.8}, {0.8, 1}, {1, 1}};

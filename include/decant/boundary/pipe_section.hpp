@@ -218,16 +218,76 @@ inline std::optional<PipeSection> follow_pipe(const BoundingVolumeHierarchy& sur
   return section;
 }
 
-/// Sections along the middle of a pipe from `from` inward, `step` [m] apart, for as long as the pipe goes on and at
-/// most `length` [m]; `from` itself is the first.
+/// The section behind a sharp corner that is next to the section `from`, where the pipe goes on in one direction and
+/// no other; it lies two radii behind the corner, and its distance is counted through the corner's middle. Nothing
+/// where there is no corner, the pipe branches, or it ends.
+inline std::optional<PipeSection> behind_corner(const BoundingVolumeHierarchy& surface, const PipeSection& from) {
+  expects(from.area > 0 && !from.outline.empty(), "behind_corner: section", "one that was found", from.area);
+  const double radius = from.radius(), reach = 8 * radius;
+  // a corner's own room ends within two radii of its middle
+  const double goes_on = 3.5 * radius;
+  constexpr double other_way = 0.6;  // cosine between directions that are not the same way
+  constexpr int directions = 512;
+  const auto free_path = [&](const Vector3<double>& x, const Vector3<double>& direction) {
+    const auto hit = surface.first_hit_along(x, direction, reach);
+    return hit ? hit->fraction * reach : reach;
+  };
+  struct Way {
+    Vector3<double> from, direction;
+    double length = 0;
+  };
+  // even over the sphere (Vogel's spiral)
+  const auto direction_of = [&](int k) {
+    const double z = 1 - (2 * k + 1.0) / directions, turn = k * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    return Vector3<double>(r * std::cos(turn), r * std::sin(turn), z);
+  };
+  const double ahead = free_path(from.center, -from.direction);
+  Way best;
+  for (double depth = 0.25 * radius; depth < std::min(ahead, 3 * radius); depth += 0.25 * radius) {
+    const Vector3<double> x = from.center - depth * from.direction;
+    for (int k = 0; k < directions; ++k) {
+      const Vector3<double> direction = direction_of(k);
+      const double length = direction.dot(from.direction) < other_way ? free_path(x, direction) : 0;
+      if (length > best.length) {
+        best = {x, direction, length};
+      }
+    }
+  }
+  if (best.length < goes_on) {
+    return std::nullopt;
+  }
+  for (int k = 0; k < directions; ++k) {
+    const Vector3<double> direction = direction_of(k);
+    if (direction.dot(from.direction) < other_way && direction.dot(best.direction) < other_way &&
+        free_path(best.from, direction) > goes_on) {
+      return std::nullopt;
+    }
+  }
+  auto section = pipe_section(surface, best.from + 2 * radius * best.direction, -best.direction, 4 * radius);
+  if (!section || !(section->area < 1.5 * from.area) || !(section->area > from.area / 1.5)) {
+    return std::nullopt;
+  }
+  // through where the middles of both pipes come closest to each other
+  const Vector3<double> between = from.center - section->center;
+  section->distance =
+      from.distance + between.dot(from.direction + section->direction) / (1 + section->direction.dot(from.direction));
+  return section;
+}
+
+/// Sections along the middle of a pipe from `from` inward, `step` [m] apart, through bends and sharp corners, for as
+/// long as the pipe goes on without branching and at most `length` [m]; `from` itself is the first.
 inline std::vector<PipeSection> center_line(const BoundingVolumeHierarchy& surface, const PipeSection& from,
                                             double length, double step) {
   expects(step > 0 && std::isfinite(step), "center_line: step [m]", "> 0 and finite", step);
   expects(length >= 0 && length / step < 1e5, "center_line: length [m]", ">= 0 and below 100,000 steps", length);
   std::vector<PipeSection> line{from};
-  for (int k = 1; k * step <= length * (1 + 1e-9); ++k) {
+  while (line.back().distance + step <= from.distance + length * (1 + 1e-9)) {
     auto next = follow_pipe(surface, line.back(), step);
     if (!next) {
+      next = behind_corner(surface, line.back());
+    }
+    if (!next || next->distance > from.distance + length * (1 + 1e-9)) {
       break;
     }
     line.push_back(std::move(*next));
