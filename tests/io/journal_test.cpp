@@ -43,7 +43,7 @@ std::vector<std::string> keys_up_to(std::size_t count) {
 }
 
 /// What opening a file with this text as a journal of "settings" says.
-std::string refusal(const decant_test::TemporaryFolder& folder, const std::string& text) {
+std::string refusal_of_journal(const decant_test::TemporaryFolder& folder, const std::string& text) {
   const auto path = folder.write("refused.journal", text);
   const std::string message = decant_test::message_of([&] { const Journal journal(path, "settings"); });
   CHECK(text_of(path) == text);
@@ -207,7 +207,7 @@ TEST_CASE("journal: a sweep whose process is killed goes on where it was") {
 TEST_CASE("journal: results of something else are refused") {
   const decant_test::TemporaryFolder folder("journal_fingerprint");
   const std::string header = "decant journal 1\t";
-  CHECK(refusal(folder, header + "others\na\t1\t2\n") ==
+  CHECK(refusal_of_journal(folder, header + "others\na\t1\t2\n") ==
         ": fingerprint must be \"settings\", got \"others\": results of something else");
   // where long ones differ is shown
   const std::string same(500, 'x');
@@ -221,20 +221,22 @@ TEST_CASE("journal: results of something else are refused") {
 TEST_CASE("journal: files that are none, or are damaged, are refused and left as they are") {
   const decant_test::TemporaryFolder folder("journal_refused");
   const std::string header = "decant journal 1\tsettings\n";
-  CHECK(refusal(folder, header + "a\t1\t2\na\t1\t2\n").empty());  // said twice, by two runs at once
-  CHECK(refusal(folder, "a table\n1,2\n") == ": line 1 must be \"decant journal 1\", got \"a table\\x0a\"");
-  CHECK(refusal(folder, "notes of mine") == ": line 1 must be the beginning of a journal, got \"notes of mine\"");
-  CHECK(refusal(folder, "decant journal 2\tsettings\n").find("line 1 must be \"decant journal 1\"") !=
+  CHECK(refusal_of_journal(folder, header + "a\t1\t2\na\t1\t2\n").empty());  // said twice, by two runs at once
+  CHECK(refusal_of_journal(folder, "a table\n1,2\n") == ": line 1 must be \"decant journal 1\", got \"a table\\x0a\"");
+  CHECK(refusal_of_journal(folder, "notes of mine") ==
+        ": line 1 must be the beginning of a journal, got \"notes of mine\"");
+  CHECK(refusal_of_journal(folder, "decant journal 2\tsettings\n").find("line 1 must be \"decant journal 1\"") !=
         std::string::npos);
-  CHECK(refusal(folder, "decant journal 1\n").find("line 1 must be \"decant journal 1\"") != std::string::npos);
+  CHECK(refusal_of_journal(folder, "decant journal 1\n").find("line 1 must be \"decant journal 1\"") !=
+        std::string::npos);
   const std::string sentence = ": line 3 must be a key, a count, and as many numbers, got \"";
   for (const char* line : {"b", "b\t", "b\t1", "b\t2\t1", "b\t1\t1\t2", "b\tx\t1", "b\t-1", "b\t1\tx", "b\t1\tnan",
                            "b\t1\t", "b\t1\t1 ", "b\t1\t#", "b\t1\t#xyz", "b\t1\t#1234567890abcdef0", "\\q\t1\t1",
                            "b\\\t1\t1", "", "b\t99999999999999999999\t1", "b\t1\t1e999"}) {
     INFO(line);
-    CHECK(refusal(folder, header + "a\t1\t2\n" + line + "\nc\t1\t2\n").find(sentence) == 0);
+    CHECK(refusal_of_journal(folder, header + "a\t1\t2\n" + line + "\nc\t1\t2\n").find(sentence) == 0);
   }
-  CHECK(refusal(folder, header + "a\t1\t0\na\t1\t-0\n") ==
+  CHECK(refusal_of_journal(folder, header + "a\t1\t0\na\t1\t-0\n") ==
         ": line 3 must be of a new key, or what was there before, got \"a\\x091\\x09-0\"");
 
   const auto in_no_folder = folder.path() / "none" / "a.journal";

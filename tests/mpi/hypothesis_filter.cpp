@@ -84,7 +84,7 @@ void same_bits_as_threads() {
   require(made == own, "trackers are made only where they are kept");
 
   FallingDust reality = falling_with(-2).model();
-  for (int frame = 1; frame <= 12; ++frame) {
+  for (int frame = 1; frame <= 8; ++frame) {
     const std::string in_frame = ", frame " + std::to_string(frame);
     if (frame == 4) {
       threads.tracker(fails).model().broken = true;
