@@ -38,6 +38,7 @@ class MpiCommunicator {
  public:
   explicit MpiCommunicator(MPI_Comm original) {
     MPI_Comm_dup(original, &handle_);
+    MPI_Comm_set_errhandler(handle_, MPI_ERRORS_ARE_FATAL);  // a lost process ends the program, as is MPI's default
     int number = 0;
     MPI_Comm_size(handle_, &number);
     size_ = static_cast<std::size_t>(number);
