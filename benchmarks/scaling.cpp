@@ -495,8 +495,7 @@ double track_hypotheses(const Model& cup, int count, int frames, int threads) {
   using OneTracker = Tracker<Model, CorrectorType>;
   HypothesisFilterSettings settings;
   settings.least_probability = 0;  // or hypotheses would be given up, and frames get cheaper
-  settings.threads = {threads};
-  HypothesisFilter<OneTracker> filter(settings);
+  HypothesisFilter<OneTracker> filter(settings, ThreadExecutor{{threads}});
   std::mt19937 generator(1);
   std::uniform_real_distribution<float> nudge(-1e-3F, 1e-3F);
   for (int k = 0; k < count; ++k) {

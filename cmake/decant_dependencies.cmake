@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Finds what decant is built on. Nothing is downloaded. Sets decant_has_openmp, decant_has_nanoflann, decant_has_io.
+# Finds what decant is built on. Nothing is downloaded. Sets decant_has_openmp, decant_has_nanoflann, decant_has_io,
+# decant_has_mpi.
 
 # No version in the call: Eigen's own version file refuses 5.0 where 3.4 is asked for.
 find_package(Eigen3 REQUIRED NO_MODULE)
@@ -35,5 +36,15 @@ if(DECANT_WITH_IO)
     set(decant_has_io TRUE)
   else()
     message(STATUS "decant: no nlohmann_json or no PNG, target decant::io is left out")
+  endif()
+endif()
+
+set(decant_has_mpi FALSE)
+if(DECANT_WITH_MPI)
+  find_package(MPI QUIET COMPONENTS CXX)
+  if(TARGET MPI::MPI_CXX)
+    set(decant_has_mpi TRUE)
+  else()
+    message(STATUS "decant: no MPI, target decant::mpi is left out")
   endif()
 endif()

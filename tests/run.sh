@@ -26,7 +26,7 @@ give_up() {
   exit 1
 }
 
-./cmake/install_dependencies.sh catch2 browser || give_up "The tests did not start."
+./cmake/install_dependencies.sh catch2 browser mpi || give_up "The tests did not start."
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DDECANT_BUILD_TESTS=ON -DDECANT_BUILD_EXAMPLES=ON \
   -DDECANT_BUILD_BENCHMARKS="$for_ci" -DDECANT_WARNINGS_AS_ERRORS="$for_ci" \
   -DDECANT_SHARED_DATA_DIR="${DECANT_SHARED_DATA_DIR:-}" || give_up "Configuring failed."

@@ -103,14 +103,13 @@ struct PosteriorCourse {
 /// @param progress is told the share that is done, 0 .. 1.
 template <class CorrectorType>
 PosteriorCourse weigh(const decant::Recording& recording, const std::vector<NamedModel>& hypotheses,
-                      const TrackingOptions& options, decant::HypothesisFilterSettings settings,
+                      const TrackingOptions& options, const decant::HypothesisFilterSettings& settings,
                       const std::function<void(double)>& progress) {
   using namespace decant;
   PosteriorCourse course;
-  settings.threads = {options.threads};
   TrackingOptions each = options;
   each.threads = 1;  // simulations run side by side
-  HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings);
+  HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings, ThreadExecutor{{options.threads}});
   for (const NamedModel& hypothesis : hypotheses) {
     course.names.push_back(hypothesis.name);
     filter.add(tracker_for(recording, hypothesis.model, CorrectorType(), each), hypothesis.log_prior);

@@ -100,9 +100,8 @@ inline TrackingResult track_amounts(const decant::Recording& recording, const Tr
                                     const TrackingOptions& options, const std::filesystem::path& truth_masks,
                                     const std::function<void(std::size_t)>& progress) {
   const double told = options.initial_amount_factor, ratio = 1.13, deviation = 0.3;  // of the amount's logarithm
-  decant::HypothesisFilterSettings settings;
-  settings.threads = {options.threads};
-  decant::HypothesisFilter<decant::Tracker<TrackingModel, decant::SilhouetteCorrector<>>> filter(settings);
+  decant::HypothesisFilter<decant::Tracker<TrackingModel, decant::SilhouetteCorrector<>>> filter(
+      {}, decant::ThreadExecutor{{options.threads}});
   TrackingModel empty = model;  // bodies are slow to add, and can be shared
   empty.remove_particles_if([](decant::Index) { return true; });
   for (int k = -4; k <= 4; ++k) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// Everything but io/, testing/ and neighbor/kd_tree.hpp.
+/// Everything but io/, testing/, hypothesis/mpi_executor.hpp and neighbor/kd_tree.hpp.
 
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # What a reader may rely on in every header under INCLUDE, checked by text:
 # - only io/ opens files or prints; only core/parallel.hpp speaks OpenMP; only neighbor/kd_tree.hpp includes nanoflann;
+#   only hypothesis/mpi_executor.hpp speaks MPI, and no other header includes it;
 # - #pragma once, an SPDX line, no `using namespace`, no macros but DECANT_*;
 # - all of decant is in the inline namespace DECANT_TARGET, whose name core/target.hpp finds.
 cmake_minimum_required(VERSION 3.22)
@@ -38,6 +39,10 @@ foreach(header IN LISTS headers)
   endif()
   if(NOT header STREQUAL "decant/neighbor/kd_tree.hpp")
     forbid(${header} "${text}" "# *include *[<\"]nanoflann[^\n]*" "nanoflann stays behind neighbor/kd_tree.hpp")
+  endif()
+  if(NOT header STREQUAL "decant/hypothesis/mpi_executor.hpp")
+    forbid(${header} "${text}" "# *include *[<\"](mpi|decant/hypothesis/mpi_executor)\\.h[^\n]*"
+           "MPI stays behind hypothesis/mpi_executor.hpp")
   endif()
   forbid(${header} "${text}" "\n *using +namespace[^\n]*" "a header must not open a namespace for its readers")
   if(NOT header STREQUAL "decant/core/target.hpp")

@@ -17,6 +17,7 @@ endfunction()
 
 foreach(line IN ITEMS "#include <iostream>" "#include <fstream>" "inline void f() { std::printf(\"\"), 0 }"
         "#include <png.h>" "#include <decant/io/scene.hpp>" "#include <nanoflann.hpp>" "#include <omp.h>"
+        "#include <mpi.h>" "#include <decant/hypothesis/mpi_executor.hpp>"
         "#pragma omp parallel for" "using namespace std" "#define SQUARE(x) x" "#define DECANT_SQUARE(x) x"
         "namespace decant {" "namespace decant::detail {" "namespace decant::inline DECANT_TARGET {")
   try(core/part.hpp "${start}${line}\n" TRUE)
@@ -29,4 +30,5 @@ try(core/part.hpp "${start}#include <decant/core/target.hpp>\nnamespace decant::
 try(io/part.hpp "${start}#include <fstream>\n" FALSE)
 try(version.hpp "${start}#define DECANT_VERSION 1\n" FALSE)
 try(neighbor/kd_tree.hpp "${start}#include <nanoflann.hpp>\n" FALSE)
+try(hypothesis/mpi_executor.hpp "${start}#include <mpi.h>\n" FALSE)
 try(core/parallel.hpp "${start}#include <omp.h>\n" FALSE)

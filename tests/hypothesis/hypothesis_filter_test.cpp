@@ -31,9 +31,10 @@ DustTracker<CorrectorType> falling_with(double gravity) {
 
 /// Hypotheses that the dust falls with 0, 1, 2, 3 and 4 m/s^2. @param frames of what really falls with 2 m/s^2.
 template <class CorrectorType>
-HypothesisFilter<DustTracker<CorrectorType>> after(int frames, HypothesisFilterSettings settings = {}) {
+HypothesisFilter<DustTracker<CorrectorType>> after(int frames, HypothesisFilterSettings settings = {},
+                                                   ThreadExecutor executor = {}) {
   settings.posterior.least_squared = 0.5;  // dust is thin, and its model right to the last bit
-  HypothesisFilter<DustTracker<CorrectorType>> filter(settings);
+  HypothesisFilter<DustTracker<CorrectorType>> filter(settings, executor);
   for (int gravity = 0; gravity <= 4; ++gravity) {
     filter.add(falling_with<CorrectorType>(-gravity));
   }
@@ -139,11 +140,9 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
 TEST_CASE("hypothesis filter: the same bits for 1, 2 and 4 threads", "[threads]") {
   HypothesisFilterSettings settings;
   settings.least_probability = 0;
-  settings.threads = {1};
-  const auto alone = after<TransportCorrector<double>>(3, settings);
+  const auto alone = after<TransportCorrector<double>>(3, settings, {{1}});
   for (const int threads : {2, 4}) {
-    settings.threads = {threads};
-    const auto shared = after<TransportCorrector<double>>(3, settings);
+    const auto shared = after<TransportCorrector<double>>(3, settings, {{threads}});
     for (std::size_t k = 0; k < alone.size(); ++k) {
       CHECK(shared.log_posterior(k) == alone.log_posterior(k));
     }
@@ -159,6 +158,12 @@ TEST_CASE("hypothesis filter: settings are checked") {
   settings.least_probability = 1;
   CHECK_THROWS_WITH(Filter(settings), decant_test::contains("in [0, 1)"));
   Filter filter;
+  CHECK(filter.add([] { return falling_with<OpenLoop<double>>(0); }) == 0);
+  CHECK(filter.has_tracker(0));
   CHECK_THROWS_WITH(filter.add(falling_with<OpenLoop<double>>(0), -std::numeric_limits<double>::infinity()),
                     decant_test::contains("log_prior must be finite"));
+  CHECK(filter.size() == 1);
+  const Mask mask = decant_test::seen(FallingDust{}.dust);
+  const std::vector<CameraMask> masks{{0, mask}};
+  CHECK(filter.track({0.1, {}, masks}).advanced());  // what was refused left nothing behind
 }

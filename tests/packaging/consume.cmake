@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Configures, builds and runs the consumer in PROJECT with a C++17 default and looks at what reached its compiler. With
-# REFUSED, configuring has to fail with that sentence instead.
+# REFUSED, configuring has to fail with that sentence instead; with NOT_LOOKED_FOR, that package must not be looked for.
 cmake_minimum_required(VERSION 3.22)
 
 file(REMOVE_RECURSE "${BUILD}")
@@ -25,6 +25,12 @@ if(DEFINED REFUSED)
 endif()
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "configuring failed:\n${output}")
+endif()
+if(DEFINED NOT_LOOKED_FOR)
+  file(STRINGS "${BUILD}/CMakeCache.txt" traces REGEX "^${NOT_LOOKED_FOR}_")
+  if(traces)
+    message(FATAL_ERROR "${NOT_LOOKED_FOR} was looked for, and nobody asked for it: ${traces}")
+  endif()
 endif()
 execute_process(COMMAND "${CMAKE_COMMAND}" --build "${BUILD}" COMMAND_ERROR_IS_FATAL ANY)
 execute_process(COMMAND "${BUILD}/consumer" COMMAND_ERROR_IS_FATAL ANY)

@@ -31,7 +31,8 @@ endif()
 
 # consumers that ask for a version ask for the current one
 string(REGEX MATCH "^[0-9]+\\.[0-9]+" minor "${VERSION}")
-foreach(file IN ITEMS examples/consumer/CMakeLists.txt tests/packaging/with_io/CMakeLists.txt)
+foreach(file IN ITEMS examples/consumer/CMakeLists.txt tests/packaging/with_io/CMakeLists.txt
+        tests/packaging/with_mpi/CMakeLists.txt)
   file(READ "${SOURCE}/${file}" text)
   if(NOT text MATCHES "find_package\\(decant ${minor} REQUIRED")
     message(SEND_ERROR "${file} does not ask for decant ${minor}")

@@ -19,11 +19,11 @@ using JobResult = std::vector<double>;
 /// run(count, work, done): calls work(k), which gives a JobResult, exactly once for each k in [0, count), in any order,
 /// and returns all results in the order of k. done(k, result) is told each job as it ends, one at a time, in the
 /// process that owns the terminal and the files (process() 0): for progress, and for what must survive a run that is
-/// killed. Where work throws, no more jobs begin, and run throws what the lowest k threw, or an std::runtime_error that
-/// says so if that was in another process.
+/// killed. Where work throws, or done, no more jobs begin, and run throws what the lowest k threw, or an
+/// std::runtime_error that says so if that was in another process.
 /// With several processes() all of them make the same calls with the same counts, as one program; job k is work of
 /// process k % processes(), so that what belongs to it may be kept there; run returns all results in each of them.
-/// Law: results do not depend on the executor.
+/// Laws (decant/testing/executor.hpp): each of the above; results do not depend on the executor, to the bit.
 template <class E>
 concept Executor = requires(E& executor, const E& asked, std::size_t count, JobResult (*work)(std::size_t),
                             void (*done)(std::size_t, const JobResult&)) {

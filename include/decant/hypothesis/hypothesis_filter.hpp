@@ -6,16 +6,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <decant/core/expects.hpp>
-#include <decant/core/parallel.hpp>
+#include <decant/core/subnormal.hpp>
 #include <decant/core/target.hpp>
+#include <decant/core/types.hpp>
+#include <decant/hypothesis/executor.hpp>
 #include <decant/hypothesis/posterior.hpp>
+#include <decant/hypothesis/thread_executor.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
 #include <decant/tracking/tracker.hpp>
 
@@ -26,23 +31,97 @@ struct HypothesisFilterSettings {
   int cell_px = 20;  ///< see SilhouetteCells, >= 1; misfits are counted in cells
   PosteriorSettings posterior{};
   double least_probability = 1e-6;  ///< hypotheses below this share of the best one's are given up, in [0, 1); 0: none
-  Threads threads{};                ///< over which hypotheses are shared out
 };
+
+namespace detail {
+
+/// What the other processes need to know of a tracker's frame.
+struct HypothesisFrame {
+  FrameReport report{};
+  Misfit misfit{};
+};
+
+/// As numbers, and back: counts and states are whole numbers below 2^53, which a double holds.
+inline JobResult numbers_of(const HypothesisFrame& frame) {
+  const FrameReport& report = frame.report;
+  JobResult numbers;
+  numbers.reserve(24);
+  const auto put = [&](auto value) { numbers.push_back(static_cast<double>(value)); };
+  put(frame.misfit.squared);
+  put(frame.misfit.measured);
+  put(report.status);
+  put(report.time);
+  for (const Overlap* each : {&report.prior, &report.posterior}) {
+    put(each->compared_px);
+    put(each->predicted_px);
+    put(each->observed_px);
+    put(each->both_px);
+    put(each->comparable);
+  }
+  put(report.log_likelihood);
+  put(report.correction.moved);
+  put(report.correction.mean_shift);
+  put(report.correction.relocated);
+  put(report.relocated_volume);
+  put(report.physics_ms);
+  put(report.drawing_ms);
+  put(report.correction_ms);
+  put(report.relaxation_ms);
+  return numbers;
+}
+
+inline HypothesisFrame frame_of(const JobResult& numbers) noexcept {
+  HypothesisFrame frame;
+  FrameReport& report = frame.report;
+  auto next = numbers.begin();
+  const auto take = [&](auto& value) { value = static_cast<std::remove_reference_t<decltype(value)>>(*next++); };
+  take(frame.misfit.squared);
+  take(frame.misfit.measured);
+  report.status = static_cast<FrameStatus>(static_cast<int>(*next++));
+  take(report.time);
+  for (Overlap* each : {&report.prior, &report.posterior}) {
+    take(each->compared_px);
+    take(each->predicted_px);
+    take(each->observed_px);
+    take(each->both_px);
+    take(each->comparable);
+  }
+  take(report.log_likelihood);
+  take(report.correction.moved);
+  take(report.correction.mean_shift);
+  take(report.correction.relocated);
+  take(report.relocated_volume);
+  take(report.physics_ms);
+  take(report.drawing_ms);
+  take(report.correction_ms);
+  take(report.relaxation_ms);
+  return frame;
+}
+
+}  // namespace detail
 
 /// Runs a tracker for each hypothesis on the same frames and keeps their posterior probabilities. The evidence is in
 /// what a tracker predicted before it was corrected by the frame, the sum over cells of the squared difference between
 /// the predicted and the observed share of liquid: a strong corrector makes any hypothesis fit the mask that it has
 /// just seen. What such sums are worth is Posterior's to say. Frames in which no mask was believed say nothing. Works
 /// with any corrector, OpenLoop among them (Schenck and Fox 2017, section V-B, has both).
-template <class TrackerType>
+///
+/// With an executor of several processes all of them make the same calls with the same frames, and each keeps the
+/// trackers of hypotheses k with k % processes() == process(). Reports, probabilities and what was given up are the
+/// same in each of them, to the bit; the trackers themselves are only where has_tracker(k) says so.
+template <class TrackerType, class ExecutorType = ThreadExecutor>
 class HypothesisFilter {
+  static_assert(Executor<ExecutorType>,
+                "HypothesisFilter: Executor must model decant::Executor, see <decant/hypothesis/executor.hpp>");
+
  public:
   using Tracker = TrackerType;
   using Settings = HypothesisFilterSettings;
 
+  /// @param executor over which hypotheses are shared out.
   /// Throws std::invalid_argument if a setting is out of range.
-  explicit HypothesisFilter(const Settings& settings = {})
-      : settings_(settings), cells_(settings.cell_px), posterior_(settings.posterior) {
+  explicit HypothesisFilter(const Settings& settings = {}, ExecutorType executor = {})
+      : settings_(settings), cells_(settings.cell_px), posterior_(settings.posterior), executor_(std::move(executor)) {
     expects(settings.least_probability >= 0 && settings.least_probability < 1, "HypothesisFilter: least_probability",
             "in [0, 1)", settings.least_probability);
   }
@@ -51,8 +130,17 @@ class HypothesisFilter {
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
   /// @return its number, counting from 0.
   std::size_t add(Tracker tracker, double log_prior = 0) {
+    return add([&] { return std::move(tracker); }, log_prior);
+  }
+  /// The same, for a tracker that make() gives, which is called only where the hypothesis is kept.
+  template <std::invocable Make>
+  std::size_t add(Make&& make, double log_prior = 0) {
+    Hypothesis hypothesis;
+    if (hypotheses_.size() % executor_.processes() == executor_.process()) {
+      hypothesis.tracker.emplace(make());
+    }
     const std::size_t number = posterior_.add(log_prior);
-    hypotheses_.push_back({std::move(tracker), {}, {}, 0});
+    hypotheses_.push_back(std::move(hypothesis));
     return number;
   }
 
@@ -67,30 +155,36 @@ class HypothesisFilter {
       return nothing;
     }
     const std::size_t before = best();
-    parallel_ranges(static_cast<Index>(hypotheses_.size()), settings_.threads, 1, [&](Index begin, Index) {
-      Hypothesis& hypothesis = hypotheses_[static_cast<std::size_t>(begin)];
-      if (hypothesis.tracker) {
-        hypothesis.report = hypothesis.tracker->track(frame);
-        hypothesis.misfit = misfit_of(frame, hypothesis);
-      }
-    });
+    const std::vector<JobResult> frames = executor_.run(
+        hypotheses_.size(),
+        [&](std::size_t k) {
+          Hypothesis& hypothesis = hypotheses_[k];
+          if (hypothesis.given_up) {
+            return JobResult{};
+          }
+          const SubnormalsAsZero quick;
+          hypothesis.last.report = hypothesis.tracker->track(frame);
+          return detail::numbers_of({hypothesis.last.report, misfit_of(frame, hypothesis)});
+        },
+        tell_nobody);
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-      if (hypotheses_[k].tracker) {
-        posterior_.observe(k, hypotheses_[k].misfit);
+      if (!hypotheses_[k].given_up) {
+        hypotheses_[k].last = detail::frame_of(frames[k]);
+        posterior_.observe(k, hypotheses_[k].last.misfit);
       }
     }
     give_up();
-    return hypotheses_[given_up(before) && !hypotheses_[before].report.advanced() ? best() : before].report;
+    return hypotheses_[given_up(before) && !hypotheses_[before].last.report.advanced() ? best() : before].last.report;
   }
 
   std::size_t size() const noexcept { return hypotheses_.size(); }
   std::size_t running() const noexcept {
-    return static_cast<std::size_t>(std::count_if(hypotheses_.begin(), hypotheses_.end(),
-                                                  [](const Hypothesis& each) { return each.tracker.has_value(); }));
+    return static_cast<std::size_t>(
+        std::count_if(hypotheses_.begin(), hypotheses_.end(), [](const Hypothesis& each) { return !each.given_up; }));
   }
   /// How its last frame went.
-  const FrameReport& report(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).report; }
-  bool given_up(std::size_t hypothesis) const { return !hypotheses_.at(hypothesis).tracker.has_value(); }
+  const FrameReport& report(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).last.report; }
+  bool given_up(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).given_up; }
 
   /// Prior and evidence [nat], up to a constant that all share. One that was given up stays as far below the most
   /// probable one as it was then, which is at most what more frames would have left it; -infinity if its model failed.
@@ -109,23 +203,26 @@ class HypothesisFilter {
   /// Misfits so far, and what they are worth.
   const Posterior& posterior() const noexcept { return posterior_; }
 
-  /// Throws std::invalid_argument for one that was given up.
+  /// Whether its tracker is in this process: it is of those that are kept here, and was not given up.
+  bool has_tracker(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).tracker.has_value(); }
+  /// Throws std::invalid_argument for one that was given up or is kept in another process.
   Tracker& tracker(std::size_t hypothesis) {
     expects(!given_up(hypothesis), "HypothesisFilter: hypothesis", "one that was not given up", hypothesis);
+    expects(has_tracker(hypothesis), "HypothesisFilter: hypothesis", "one that this process keeps", hypothesis);
     return *hypotheses_[hypothesis].tracker;
   }
 
  private:
   struct Hypothesis {
-    std::optional<Tracker> tracker;
-    FrameReport report;
-    Misfit misfit;  ///< of the last frame
-    double behind;  ///< the most probable one, when this one was given up [nat]
+    std::optional<Tracker> tracker{};  ///< where it is kept, until it is given up
+    detail::HypothesisFrame last{};
+    bool given_up = false;
+    double behind = 0;  ///< the most probable one, when this one was given up [nat]
   };
 
   Misfit misfit_of(const TrackerFrame& frame, const Hypothesis& hypothesis) const noexcept {
     Misfit misfit;
-    if (!hypothesis.report.advanced()) {
+    if (!hypothesis.last.report.advanced()) {
       return misfit;
     }
     for (const CameraMask& mask : frame.masks) {
@@ -139,26 +236,27 @@ class HypothesisFilter {
   }
 
   void give_up() noexcept {
-    const auto failed = [](const Hypothesis& each) { return each.report.status == FrameStatus::ModelFailed; };
+    const auto failed = [](const Hypothesis& each) { return each.last.report.status == FrameStatus::ModelFailed; };
     const bool one_stands = std::any_of(hypotheses_.begin(), hypotheses_.end(),
-                                        [&](const Hypothesis& each) { return each.tracker && !failed(each); });
+                                        [&](const Hypothesis& each) { return !each.given_up && !failed(each); });
     if (!one_stands) {
       return;
     }
     const auto drop = [&](std::size_t k, double behind) {
       hypotheses_[k].tracker.reset();
+      hypotheses_[k].given_up = true;
       hypotheses_[k].behind = behind;
       posterior_.exclude(k);
     };
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-      if (hypotheses_[k].tracker && failed(hypotheses_[k])) {
+      if (!hypotheses_[k].given_up && failed(hypotheses_[k])) {
         drop(k, std::numeric_limits<double>::infinity());
       }
     }
     const double highest = posterior_.log_posterior(best());
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
       const double behind = highest - posterior_.log_posterior(k);
-      if (hypotheses_[k].tracker && std::exp(-behind) < settings_.least_probability) {
+      if (!hypotheses_[k].given_up && std::exp(-behind) < settings_.least_probability) {
         drop(k, behind);
       }
     }
@@ -167,6 +265,7 @@ class HypothesisFilter {
   Settings settings_;
   SilhouetteCells cells_;
   Posterior posterior_;
+  ExecutorType executor_;
   std::vector<Hypothesis> hypotheses_{};
 };
 
