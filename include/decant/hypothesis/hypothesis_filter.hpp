@@ -13,7 +13,9 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/image.hpp>
 #include <decant/core/parallel.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/target.hpp>
 #include <decant/hypothesis/posterior.hpp>
 #include <decant/tracking/silhouette_cells.hpp>
@@ -49,10 +51,14 @@ class HypothesisFilter {
 
   /// Adds a hypothesis. All trackers have the same cameras and bodies by number, and one time.
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
+  /// @param region by camera, the part of its picture that this hypothesis is about: elsewhere its tracker sees no
+  /// liquid, and no misfits are counted; cells begin at its corner. Without, all of every picture.
   /// @return its number, counting from 0.
-  std::size_t add(Tracker tracker, double log_prior = 0) {
+  std::size_t add(Tracker tracker, double log_prior = 0, std::vector<PixelBox> region = {}) {
+    expects(region.empty() || region.size() == tracker.cameras(), "HypothesisFilter: cameras of the region",
+            "as many as the tracker has", region.size());
     const std::size_t number = posterior_.add(log_prior);
-    hypotheses_.push_back({std::move(tracker), {}, {}, 0});
+    hypotheses_.push_back({std::move(tracker), {}, {}, 0, std::move(region), {}});
     return number;
   }
 
@@ -70,7 +76,7 @@ class HypothesisFilter {
     parallel_ranges(static_cast<Index>(hypotheses_.size()), settings_.threads, 1, [&](Index begin, Index) {
       Hypothesis& hypothesis = hypotheses_[static_cast<std::size_t>(begin)];
       if (hypothesis.tracker) {
-        hypothesis.report = hypothesis.tracker->track(frame);
+        hypothesis.report = follow(frame, hypothesis);
         hypothesis.misfit = misfit_of(frame, hypothesis);
       }
     });
@@ -99,6 +105,13 @@ class HypothesisFilter {
                                 : posterior_.log_posterior(hypothesis);
   }
 
+  /// Follows a hypothesis no further, as one that has become too improbable.
+  void give_up(std::size_t hypothesis) {
+    if (!given_up(hypothesis)) {
+      drop(hypothesis, posterior_.log_posterior(best()) - posterior_.log_posterior(hypothesis));
+    }
+  }
+
   /// Among all hypotheses and "none of these"; those given up have none.
   double probability(std::size_t hypothesis) const { return posterior_.probability(hypothesis); }
   double probability_of_none() const noexcept { return posterior_.probability_of_none(); }
@@ -121,7 +134,38 @@ class HypothesisFilter {
     FrameReport report;
     Misfit misfit;  ///< of the last frame
     double behind;  ///< the most probable one, when this one was given up [nat]
+    std::vector<PixelBox> region;
+    std::vector<Mask> cropped;  ///< the frame's masks, without what is outside of the region
   };
+
+  static PixelBox region_of(const Hypothesis& hypothesis, std::size_t camera, const PixelBox& image) noexcept {
+    return hypothesis.region.empty() ? image : hypothesis.region[camera].intersection(image);
+  }
+
+  static FrameReport follow(const TrackerFrame& frame, Hypothesis& hypothesis) noexcept {
+    if (hypothesis.region.empty()) {
+      return hypothesis.tracker->track(frame);
+    }
+    std::vector<CameraMask> masks;
+    masks.reserve(frame.masks.size());
+    hypothesis.cropped.resize(std::max(hypothesis.cropped.size(), frame.masks.size()));
+    for (std::size_t k = 0; k < frame.masks.size(); ++k) {
+      const ConstMaskView& whole = frame.masks[k].mask;
+      Mask& cropped = hypothesis.cropped[k];
+      cropped.setZero(whole.rows(), whole.cols());
+      if (frame.masks[k].camera < hypothesis.region.size()) {
+        const PixelBox box = region_of(hypothesis, frame.masks[k].camera, PixelBox::of(whole));
+        part_of(cropped, box) = part_of(whole, box);
+      }
+      masks.push_back({frame.masks[k].camera, cropped});
+    }
+    return hypothesis.tracker->track({frame.time, frame.poses, masks, frame.cameras});
+  }
+
+  template <class Picture>
+  static auto part_of(Picture& picture, const PixelBox& box) noexcept {
+    return box.empty() ? picture.block(0, 0, 0, 0) : picture.block(box.v_begin, box.u_begin, box.height(), box.width());
+  }
 
   Misfit misfit_of(const TrackerFrame& frame, const Hypothesis& hypothesis) const noexcept {
     Misfit misfit;
@@ -130,12 +174,20 @@ class HypothesisFilter {
     }
     for (const CameraMask& mask : frame.masks) {
       if (hypothesis.tracker->believes(mask.camera)) {
-        const auto observed = cells_.shares(hypothesis.tracker->observed(mask.camera));
-        const auto predicted = cells_.shares(hypothesis.tracker->predicted_before(mask.camera));
+        const Mask& seen = hypothesis.tracker->observed(mask.camera);
+        const PixelBox box = region_of(hypothesis, mask.camera, PixelBox::of(seen));
+        const auto observed = cells_.shares(part_of(seen, box));
+        const auto predicted = cells_.shares(part_of(hypothesis.tracker->predicted_before(mask.camera), box));
         misfit += {(predicted - observed).square().sum(), observed.square().sum()};
       }
     }
     return misfit;
+  }
+
+  void drop(std::size_t k, double behind) noexcept {
+    hypotheses_[k].tracker.reset();
+    hypotheses_[k].behind = behind;
+    posterior_.exclude(k);
   }
 
   void give_up() noexcept {
@@ -145,11 +197,6 @@ class HypothesisFilter {
     if (!one_stands) {
       return;
     }
-    const auto drop = [&](std::size_t k, double behind) {
-      hypotheses_[k].tracker.reset();
-      hypotheses_[k].behind = behind;
-      posterior_.exclude(k);
-    };
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
       if (hypotheses_[k].tracker && failed(hypotheses_[k])) {
         drop(k, std::numeric_limits<double>::infinity());
