@@ -100,6 +100,15 @@ TEST_CASE("report: an axis shows the numbers that it is asked to show") {
   CHECK(decant::detail::chart_svg(chart).find("data-high=\"9\"") != std::string::npos);
 }
 
+TEST_CASE("report: only charts over time follow a film") {
+  decant::LineChart chart{"t", "amount [ml]", "y", {{"a", {5, 6}, {0.6, 0.7}, false}}};
+  const auto svg = [&] { return decant::detail::chart_svg(chart); };
+  CHECK(svg().find(" data-low=\"5\" data-high=\"6\"") != std::string::npos);
+  chart.over_time = false;
+  CHECK(svg().find("data-low") == std::string::npos);
+  CHECK(svg().find("<path class=\"line\"") != std::string::npos);
+}
+
 TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
   const decant_test::TemporaryFolder folder("report");
   decant::HtmlReport report("a <b> & c");

@@ -37,6 +37,7 @@ struct LineChart {
   std::vector<Line> lines;
   std::vector<double> x_within{};  ///< numbers that the axis shows in any case, such as where a film begins and ends
   std::vector<double> y_within{};  ///< likewise, such as 0 and 1 for a share
+  bool over_time = true;           ///< x is the time that the report's film has, which is marked in the chart
 };
 
 /// Groups of bars that stand on a common axis.
@@ -326,8 +327,10 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
   const auto x_at = [&](double x) { return left + (x - x_low) / (x_high - x_low) * (width - left - right); };
   const auto point = ChartFrame::point;
   std::string svg =
-      frame.begin(chart.title, " data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
-                                   "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\"");
+      frame.begin(chart.title, !chart.over_time ? std::string()
+                                                : " data-low=\"" + number_text(x_low) + "\" data-high=\"" +
+                                                      number_text(x_high) + "\" data-left=\"" + point(left) +
+                                                      "\" data-right=\"" + point(width - right) + "\"");
   for (const double x : x_ticks.values()) {
     if (x >= x_low - 1e-9 * x_ticks.step && x <= x_high + 1e-9 * x_ticks.step) {
       svg += "<line class=\"grid\" x1=\"" + point(x_at(x)) + "\" x2=\"" + point(x_at(x)) + "\" y1=\"" + point(top) +
