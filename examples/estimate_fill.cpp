@@ -99,7 +99,6 @@ void add_amount(decant::HtmlReport& report, const example::FillResult& result, c
       course, "median", result.grid, [&](std::size_t frame) { return example::amount_density(result, frame); },
       options.confidence);
   report.chart(course);
-  report.chart(example::course_chart("Probability of each amount that was followed", result.grid, " % full"));
   report.chart(example::followed_chart(courses));
 }
 

@@ -100,7 +100,10 @@ void write_report(const std::string& file, const decant::Recording& recording, c
   report.chart(configurations_chart(result));
   add_openings(report, result, options);
   report.heading("Every hypothesis");
-  report.chart(example::course_chart("Leg and opening [%]", result.course));
+  for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+    report.chart(example::course_chart("Opening of one leg [%]: " + result.legs[leg].name, result.course, "",
+                                       [&](std::size_t k) { return !result.leg[k] || result.leg[k] == leg; }));
+  }
   report.chart(example::followed_chart({{"legs and openings", &result.course}}));
   report.paragraph(std::to_string(result.course.frames_run) + " frames were simulated, " +
                    decant::detail::fixed_text(100.0 * static_cast<double>(result.course.frames_run) /

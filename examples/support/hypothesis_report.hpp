@@ -31,12 +31,16 @@ inline std::vector<double> times_of(const PosteriorCourse& course) {
 }
 
 /// The posterior over time, as in the figures of Schenck and Fox (2017). @param unit of names, such as " % full".
-inline decant::LineChart course_chart(const std::string& title, const PosteriorCourse& course,
-                                      const std::string& unit = {}) {
+/// @param shown which hypotheses are; beside "none of these".
+inline decant::LineChart course_chart(
+    const std::string& title, const PosteriorCourse& course, const std::string& unit = {},
+    const std::function<bool(std::size_t)>& shown = [](std::size_t) { return true; }) {
   decant::LineChart chart{title, "time [s]", "probability", {}, {}, {0, 1}};
   const std::vector<std::vector<double>> probability = course.probability();
   for (std::size_t k = 0; k < course.names.size(); ++k) {
-    chart.lines.push_back({course.names[k] + unit, times_of(course), probability[k]});
+    if (shown(k)) {
+      chart.lines.push_back({course.names[k] + unit, times_of(course), probability[k]});
+    }
   }
   chart.lines.push_back({"none of these", times_of(course), probability.back(), true});
   return chart;
@@ -81,7 +85,11 @@ inline void add_estimate_lines(decant::LineChart& chart, const std::string& name
                                const std::function<std::optional<decant::ValueDensity>(std::size_t)>& density_at,
                                double confidence, double per_value = 1) {
   decant::LineChart::Line median{name, times_of(course), {}},
-      bounds{name + ", " + std::to_string(std::lround(100 * confidence)) + " % interval", {}, {}, true};
+      bounds{name + ", " + std::to_string(std::lround(100 * confidence)) + " % interval",
+             {},
+             {},
+             true,
+             static_cast<int>(chart.lines.size())};
   std::vector<double> low, high;
   const double nothing = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t frame = 0; frame < course.time.size(); ++frame) {

@@ -59,7 +59,8 @@ TEST_CASE("hypothesis report: a density keeps its area in another unit") {
   const std::vector<double> values{0, 0.25, 0.5, 0.75, 1}, log_density{-20, -4, 0, -4, -20};
   const decant::LineChart chart =
       density_chart("t", "open [%]", "density [1/%]", {{"left", decant::ValueDensity(values, log_density)}}, 0, 1, 100);
-  const auto& [name, x, y, dashed] = chart.lines.at(0);
+  const std::vector<double>& x = chart.lines.at(0).x;
+  const std::vector<double>& y = chart.lines.at(0).y;
   double area = 0;
   for (std::size_t k = 0; k + 1 < x.size(); ++k) {
     area += (x[k + 1] - x[k]) * 0.5 * (y[k] + y[k + 1]);

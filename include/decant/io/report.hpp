@@ -29,6 +29,7 @@ struct LineChart {
     std::string name;
     std::vector<double> x, y;  ///< of equal length; the line breaks where a number is not finite
     bool dashed = false;
+    int colour_of = -1;  ///< the line, by its place in the chart, whose colour it has; -1: one of its own
   };
 
   std::string title;
@@ -161,7 +162,7 @@ inline LineChart::Line thinned(const LineChart::Line& line, std::size_t bins) {
   if (line.x.size() <= 2 * bins) {
     return line;
   }
-  LineChart::Line out{line.name, {}, {}, line.dashed};
+  LineChart::Line out{line.name, {}, {}, line.dashed, line.colour_of};
   for (std::size_t bin = 0; bin < bins; ++bin) {
     const std::size_t begin = bin * line.x.size() / bins, end = (bin + 1) * line.x.size() / bins;
     std::size_t low = begin, high = begin;
@@ -194,7 +195,8 @@ inline const char* series_color(std::size_t n) {
 
 inline std::string line_style(const LineChart& chart, std::size_t n) {
   const LineChart::Line& line = chart.lines[n];
-  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + series_color(n) + "\"" +
+  const std::size_t colour = line.colour_of < 0 ? n : static_cast<std::size_t>(line.colour_of);
+  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + series_color(colour) + "\"" +
          (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
 }
 
