@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -20,6 +21,7 @@
 #include <decant/io/table.hpp>
 
 #include "support/fill_estimate.hpp"
+#include "support/hypothesis_report.hpp"
 #include "support/result_file.hpp"
 #include "support/tool.hpp"
 
@@ -54,26 +56,73 @@ std::string sentence(const example::FillResult& result) {
          fixed_text(volume.high, 0) + ") of " + fixed_text(result.container_ml, 0) + " ml that it holds";
 }
 
+/// The same by the likelihood as printed in the paper.
+decant::Table table_as_printed(const example::FillResult& result, const example::FillOptions& options) {
+  std::vector<std::string> header{"probability of [%]"};
+  for (const int level : std::set<int>(options.levels.begin(), options.levels.end())) {
+    header.push_back(std::to_string(level) + " % full");
+  }
+  decant::Table table(header);
+  for (const std::string& name : options.methods) {
+    std::vector<std::string> row{name};
+    for (const double probability : example::probability_schenck2017(result.by_method.at(name))) {
+      row.push_back(decant::detail::fixed_text(100 * probability, 1));
+    }
+    table.add(row);
+  }
+  return table;
+}
+
+/// A run over the recording with its name in the report.
+using NamedCourse = std::pair<std::string, const example::PosteriorCourse*>;
+
+void add_amount(decant::HtmlReport& report, const example::FillResult& result, const example::FillOptions& options,
+                const std::vector<NamedCourse>& courses) {
+  const std::size_t frames = result.grid.time.size();
+  if (!result.volume_ml || frames == 0) {
+    return;
+  }
+  report.heading("How much, by the default method");
+  std::vector<example::NamedDensity> densities;
+  const std::vector<double> times = example::times_of(result.grid);
+  for (const std::size_t part : {std::size_t{1}, std::size_t{2}, std::size_t{3}}) {
+    const std::size_t frame = (frames - 1) * part / 3;
+    if (const auto density = example::amount_density(result, frame)) {
+      densities.push_back(
+          {part == 3 ? "at the end" : "after " + decant::detail::fixed_text(times[frame], 2) + " s", *density});
+    }
+  }
+  report.chart(example::density_chart("What is known of the amount", "amount [ml]", "density [1/ml]", densities,
+                                      result.grid_ml.front(), result.grid_ml.back()));
+  decant::LineChart course{"The amount over time", "time [s]", "amount [ml]", {}, {}, {0, result.container_ml}};
+  example::add_estimate_lines(
+      course, "median", result.grid, [&](std::size_t frame) { return example::amount_density(result, frame); },
+      options.confidence);
+  report.chart(course);
+  report.chart(example::followed_chart(courses));
+}
+
 void write_report(const std::string& file, const decant::Recording& recording, const example::FillResult& result,
                   const example::FillOptions& options) {
   decant::HtmlReport report("How much was in it: " + recording.name);
   report.paragraph(sentence(result) + ".");
-  report.heading("Which level, by method");
-  report.table(table_of(result, options));
-  for (const std::string& name : options.methods) {
-    report.heading("Over time: " + name);
-    report.chart(example::course_chart(name, result.by_method.at(name)));
+  std::vector<NamedCourse> courses;
+  if (!options.methods.empty()) {
+    report.heading("Which level, by method");
+    report.table(table_of(result, options));
+    for (const std::string& name : options.methods) {
+      const example::PosteriorCourse& course = result.by_method.at(name);
+      courses.emplace_back(name, &course);
+      report.chart(example::course_chart("Probability of each level: " + name, course, " % full"));
+    }
+    report.paragraph(
+        "The likelihood as printed in the paper, in which every pixel of the picture counts by itself and a "
+        "nat takes 25,000 of them, would have said:");
+    report.table(table_as_printed(result, options));
   }
-  report.heading("Which amount, by the default method");
-  decant::LineChart amounts{"Probability by amount", "amount [ml]", "probability", {}, {}, {0}};
-  decant::LineChart::Line line{"at the end of the recording", {}, {}};
-  line.x = result.grid_ml;
-  line.y = result.grid.last();
-  line.y.pop_back();  // none of these
-  amounts.lines.push_back(line);
-  report.chart(amounts);
-  report.heading("Amounts over time");
-  report.chart(example::course_chart("Amounts [%]", result.grid));
+  courses.emplace_back("default, every amount", &result.grid);
+  add_amount(report, result, options, courses);
+  example::add_best_overlays(report, recording, courses, " % full", {options.tracking.threads});
   report.write(file);
 }
 
@@ -103,6 +152,7 @@ int main(int count, char** values) {
   return example::run_tool(app, count, values, [&] {
     options.tracking.spacing = 1e-3 * spacing_mm;
     example::expect_writable({json_file, report_file});
+    options.tracking.keep_overlays = !report_file.empty();
     const decant::Recording recording = decant::read_recording(folder);
     decant::Progress progress(recording.name, 1);
     double milliseconds = 0;

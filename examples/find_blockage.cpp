@@ -3,8 +3,12 @@
 //   find_blockage RECORDING_DIR --json OUT.json --report OUT.html
 // Exit status 0: done; 1: the recording could not be followed to its end; 2: it, a file or an argument is wrong.
 
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -17,6 +21,7 @@
 #include <decant/io/table.hpp>
 
 #include "support/blockage.hpp"
+#include "support/hypothesis_report.hpp"
 #include "support/result_file.hpp"
 #include "support/tool.hpp"
 
@@ -54,17 +59,59 @@ std::string sentence(const example::BlockageResult& result) {
          (decided ? ", more than 90 % probable from " + fixed_text(*decided, 2) + " s on" : ", undecided");
 }
 
-void write_report(const std::string& file, const decant::Recording& recording, const example::BlockageResult& result) {
+/// Every configuration, over time.
+decant::LineChart configurations_chart(const example::BlockageResult& result) {
+  decant::LineChart chart{"Probability of each configuration", "time [s]", "probability", {}, {}, {0, 1}};
+  for (const auto& [name, course] : result.configurations) {
+    const bool none = name == example::PosteriorCourse::none_name;
+    chart.lines.push_back({none ? "none of these" : name, example::times_of(result.course), course, none});
+  }
+  return chart;
+}
+
+void add_openings(decant::HtmlReport& report, const example::BlockageResult& result,
+                  const example::BlockageOptions& options) {
+  report.heading("How much of each leg is open");
+  report.table(openings_of(result));
+  report.paragraph("From .. to: the " + std::to_string(std::lround(100 * options.confidence)) +
+                   " % interval, where at most one leg is not wholly open.");
+  const std::size_t frames = result.course.time.size();
+  std::vector<example::NamedDensity> densities;
+  decant::LineChart course{"The opening over time", "time [s]", "open [%]", {}, {}, {0, 100}};
+  for (std::size_t leg = 0; leg < result.legs.size() && frames > 0; ++leg) {
+    if (const auto density = example::opening_density(result, leg, frames - 1)) {
+      densities.push_back({result.legs[leg].name, *density});
+    }
+    example::add_estimate_lines(
+        course, result.legs[leg].name, result.course,
+        [&](std::size_t frame) { return example::opening_density(result, leg, frame); }, options.confidence, 100);
+  }
+  report.chart(example::density_chart("What is known of each leg at the end", "open [%]", "density [1/%]", densities, 0,
+                                      1, 100));
+  report.chart(course);
+}
+
+void write_report(const std::string& file, const decant::Recording& recording, const example::BlockageResult& result,
+                  const example::BlockageOptions& options) {
   decant::HtmlReport report("What is blocked: " + recording.name);
   report.paragraph(sentence(result) + ".");
   report.heading("Configurations");
   report.table(table_of(result));
-  report.chart(example::blockage_chart(result));
-  report.heading("How much of each leg is open");
-  report.table(openings_of(result));
-  report.paragraph("From .. to: the 90 % interval, where at most one leg is not wholly open.");
+  report.chart(configurations_chart(result));
+  add_openings(report, result, options);
   report.heading("Every hypothesis");
-  report.chart(example::course_chart("Leg and opening [%]", result.course));
+  for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+    report.chart(example::course_chart("Opening of one leg [%]: " + result.legs[leg].name, result.course, "",
+                                       [&](std::size_t k) { return !result.leg[k] || result.leg[k] == leg; }));
+  }
+  report.chart(example::followed_chart({{"legs and openings", &result.course}}));
+  report.paragraph(std::to_string(result.course.frames_run) + " frames were simulated, " +
+                   decant::detail::fixed_text(100.0 * static_cast<double>(result.course.frames_run) /
+                                                  static_cast<double>(std::max<std::size_t>(
+                                                      1, result.course.names.size() * result.course.time.size())),
+                                              0) +
+                   " % of what it takes to follow every hypothesis to the end.");
+  example::add_best_overlays(report, recording, {{options.method, &result.course}}, "", {options.tracking.threads});
   report.write(file);
 }
 
@@ -74,6 +121,7 @@ int main(int count, char** values) {
   std::string folder, json_file, report_file;
   example::BlockageOptions options;
   double spacing_mm = 0;
+  bool keep_all = false;
   CLI::App app("Finds out which leg of a pipe junction is blocked by what runs out of it.");
   app.add_option("recording", folder, "folder of a recording, format version 1, with a body of the role junction")
       ->required();
@@ -81,12 +129,15 @@ int main(int count, char** values) {
   app.add_option("--report", report_file, "writes a page with charts, for a browser");
   app.add_option("--method", options.method, "how each hypothesis follows the recording")
       ->check(CLI::IsMember(example::weighing_methods()));
+  app.add_flag("--keep-all", keep_all, "follows hopeless hypotheses to the end as well");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles; 0: five across a leg")
       ->check(CLI::Range(0.0, 20.0));
   app.add_option("--threads", options.tracking.threads, "0: all")->check(CLI::Range(0, 1024));
   return example::run_tool(app, count, values, [&] {
     options.tracking.spacing = 1e-3 * spacing_mm;
+    options.least_probability = keep_all ? 0 : options.least_probability;
     example::expect_writable({json_file, report_file});
+    options.tracking.keep_overlays = !report_file.empty();
     const decant::Recording recording = decant::read_recording(folder);
     decant::Progress progress(recording.name, 1);
     double milliseconds = 0;
@@ -104,7 +155,7 @@ int main(int count, char** values) {
       example::write_result(json_file, json);
     }
     if (!report_file.empty()) {
-      write_report(report_file, recording, result);
+      write_report(report_file, recording, result, options);
     }
     return result.course.status == "ok" ? 0 : 1;
   });

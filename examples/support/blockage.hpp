@@ -34,7 +34,9 @@ struct BlockageOptions {
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
   TrackingOptions tracking{};
-  double least_probability = 1e-4;  ///< hypotheses below this share of the best one's are given up
+  /// Hypotheses below this share of the best one's are given up. As far as probabilities are right, what is so is among
+  /// these with at most this times their number: less than a hundredth.
+  double least_probability = 1e-3;
   decant::PosteriorSettings posterior{};
 };
 
@@ -126,10 +128,13 @@ inline double log_of_sum(const std::vector<double>& logs) {
   return largest + std::log(sum);
 }
 
-/// A leg's opening, whatever the other legs' are; at most one of them is not wholly open.
-inline std::optional<decant::ValueEstimate> opening_of(const BlockageResult& result, std::size_t leg,
-                                                       double confidence) {
-  const std::vector<double> log_posterior = result.course.last_log_posterior();
+}  // namespace detail
+
+/// A leg's opening after a frame, whatever the other legs' are; at most one of them is not wholly open. Nothing where
+/// every hypothesis has failed.
+inline std::optional<decant::ValueDensity> opening_density(const BlockageResult& result, std::size_t leg,
+                                                           std::size_t frame) {
+  const std::vector<double> log_posterior = result.course.log_posterior_at(frame);
   std::vector<double> opening, log_density, open;
   for (std::size_t k = 0; k < log_posterior.size(); ++k) {
     const double likelihood = log_posterior[k] - result.log_prior[k];
@@ -143,14 +148,12 @@ inline std::optional<decant::ValueEstimate> opening_of(const BlockageResult& res
     }
   }
   opening.push_back(1);
-  log_density.push_back(log_of_sum(open));
+  log_density.push_back(detail::log_of_sum(open));
   if (std::none_of(log_density.begin(), log_density.end(), [](double each) { return std::isfinite(each); })) {
     return std::nullopt;
   }
-  return decant::estimate_value(opening, log_density, confidence);
+  return decant::ValueDensity(opening, log_density);
 }
-
-}  // namespace detail
 
 /// @param progress is told the share that is done, 0 .. 1. Throws std::runtime_error for a recording without a
 /// junction, std::invalid_argument for options that make no sense.
@@ -221,7 +224,9 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
   }
   result.configurations.emplace_back(PosteriorCourse::none_name, probability.back());
   for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
-    result.leg_opening.push_back(detail::opening_of(result, leg, options.confidence));
+    const std::size_t frames = result.course.time.size();
+    const auto density = frames > 0 ? opening_density(result, leg, frames - 1) : std::nullopt;
+    result.leg_opening.push_back(density ? std::optional(estimate_value(*density, options.confidence)) : std::nullopt);
   }
   return result;
 }
@@ -283,16 +288,8 @@ inline nlohmann::json blockage_json(const BlockageResult& result, double confide
          {"measured", number_json(result.course.evidence[k].before.measured)}});
   }
   json["frames_run"] = result.course.frames_run;
+  json["followed"] = column_json(result.course.followed);
   return json;
-}
-
-inline decant::LineChart blockage_chart(const BlockageResult& result) {
-  decant::LineChart chart{"Probability of each configuration", "time [s]", "probability", {}, {}, {0, 1}};
-  for (const auto& [name, course] : result.configurations) {
-    const bool none = name == PosteriorCourse::none_name;
-    chart.lines.push_back({none ? "none of these" : name, result.course.time, course, none});
-  }
-  return chart;
 }
 
 }  // namespace example

@@ -81,6 +81,15 @@ inline double capacity_ml(const decant::Recording& recording, std::size_t body) 
 
 }  // namespace detail
 
+/// What is known of the amount after a frame [ml]; nothing where every amount has failed.
+inline std::optional<decant::ValueDensity> amount_density(const FillResult& result, std::size_t frame) {
+  const std::vector<double> log_posterior = result.grid.log_posterior_at(frame);
+  if (std::none_of(log_posterior.begin(), log_posterior.end(), [](double value) { return std::isfinite(value); })) {
+    return std::nullopt;
+  }
+  return decant::ValueDensity(result.grid_ml, log_posterior);
+}
+
 /// @param progress is told what is done, and the share of all, 0 .. 1. Throws std::runtime_error for a recording
 /// without a container, std::invalid_argument for options that make no sense.
 inline FillResult estimate_fill(const decant::Recording& told, const FillOptions& options,
@@ -107,16 +116,17 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
   }
   std::set<int> percents = grid;
   percents.insert(levels.begin(), levels.end());
-  const double jobs = static_cast<double>(options.methods.size()) + 2;
+  // filling counts as one simulation that follows the recording, of which there are so many
+  const double all = 1 + static_cast<double>(options.methods.size() * levels.size() + grid.size());
   std::map<int, TrackingModel> filled;
   for (const int percent : percents) {
-    progress("filling", static_cast<double>(filled.size()) / static_cast<double>(percents.size()) / jobs);
+    progress("filling", static_cast<double>(filled.size()) / static_cast<double>(percents.size()) / all);
     TrackingModel& model = filled.emplace(percent, empty).first->second;
     if (percent > 0) {
       fill(model, static_cast<BodyId>(container), FillAmount::fraction(0.01 * percent));
     }
   }
-  double job = 1;
+  double done = 1;
   const auto run = [&](const std::string& method, const std::set<int>& chosen, double least_probability) {
     std::vector<NamedModel> models;
     for (const int percent : chosen) {
@@ -125,9 +135,10 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
     HypothesisFilterSettings settings;
     settings.posterior = options.posterior;
     settings.least_probability = least_probability;
-    PosteriorCourse course = weigh_by(method, recording, models, tracking, settings,
-                                      [&](double share) { progress(method, (job + share) / jobs); });
-    ++job;
+    PosteriorCourse course = weigh_by(method, recording, models, tracking, settings, [&](double share) {
+      progress(method, (done + share * static_cast<double>(chosen.size())) / all);
+    });
+    done += static_cast<double>(chosen.size());
     return course;
   };
   for (const std::string& method : options.methods) {
@@ -137,9 +148,9 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
     result.grid_ml.push_back(0.01 * percent * result.container_ml);
   }
   result.grid = run(default_method, grid, options.least_probability);
-  const std::vector<double> log_posterior = result.grid.last_log_posterior();
-  if (std::any_of(log_posterior.begin(), log_posterior.end(), [](double value) { return std::isfinite(value); })) {
-    result.volume_ml = estimate_value(result.grid_ml, log_posterior, options.confidence);
+  const std::size_t frames = result.grid.time.size();
+  if (const auto density = frames > 0 ? amount_density(result, frames - 1) : std::nullopt) {
+    result.volume_ml = estimate_value(*density, options.confidence);
   }
   return result;
 }
@@ -154,6 +165,10 @@ inline nlohmann::json fill_json(const FillResult& result, double confidence) {
     json["posterior"][name] = posterior_json(course);
     json["posterior_over_time"][name] = course_json(course);
     json["evidence"][name] = evidence_json(course);
+    const std::vector<double> as_printed = probability_schenck2017(course);
+    for (std::size_t k = 0; k < course.names.size(); ++k) {
+      json["posterior_schenck2017"][name][course.names[k]] = number_json(as_printed[k]);
+    }
     json["most_probable_percent"][name] =
         course.names.empty() ? nlohmann::json() : nlohmann::json(std::stoi(course.names[course.best()]));
   }
@@ -172,6 +187,7 @@ inline nlohmann::json fill_json(const FillResult& result, double confidence) {
                                {"squared_misfit", number_json(result.grid.evidence[k].before.squared)}});
   }
   json["none_of_these"] = number_json(last.back());
+  json["followed"] = column_json(result.grid.followed);
   return json;
 }
 

@@ -219,8 +219,21 @@ inline ExperimentSection evidence_that_tells(const std::vector<FillCase>& cases,
     }
     section.table.add(row);
   }
+  // the figure of the second row, as the paper weighs it
+  std::vector<std::string> row{"likelihood as printed: mean probability of the truth [%]"};
+  for (const std::string& method : methods) {
+    std::vector<double> probability;
+    for (const FillCase& each : cases) {
+      probability.push_back(
+          number_at(*each.result, "/posterior_schenck2017/" + method + "/" + std::to_string(each.percent())));
+    }
+    row.push_back(percent_text(mean_of(probability)));
+    section.json["probability_schenck2017"][method] = number_json(mean_of(probability));
+  }
+  section.table.add(row);
   section.note =
-      "In how many recordings the figure is the smallest under the true level; - where a method has no such figure.";
+      "In how many recordings the figure is the smallest under the true level; - where a method has no such figure. "
+      "The likelihood as printed in the paper ranks by the second one, with delta = 0.50001.";
   return section;
 }
 

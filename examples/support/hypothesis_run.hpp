@@ -2,12 +2,13 @@
 #pragma once
 
 /// Weighs hypotheses about a recording against each other, frame by frame: what posterior probabilities come to over
-/// time, as JSON, and as charts and tables of a report.
+/// time, and as JSON.
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +22,7 @@
 #include <decant/correction/warp_field_schenck2017.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/io/recording_reader.hpp>
-#include <decant/io/report.hpp>
+#include <decant/tracking/image_likelihood.hpp>
 
 #include "result_file.hpp"
 #include "tracking_run.hpp"
@@ -37,6 +38,7 @@ struct NamedModel {
 
 /// What may speak for or against a hypothesis, over all frames that it was followed for.
 struct Evidence {
+  std::size_t frames = 0;
   decant::Misfit before;           ///< of what was predicted before each frame's correction: what decides
   double differing_before_px = 0;  ///< the same by pixels, as the paper's likelihood takes it
   double differing_after_px = 0;   ///< after the correction
@@ -53,8 +55,11 @@ struct PosteriorCourse {
   std::vector<std::vector<double>> log_posterior;  ///< by hypothesis and frame, see HypothesisFilter [nat]
   std::vector<double> log_none;                    ///< of "none of these", by frame
   std::vector<Evidence> evidence;                  ///< by hypothesis
-  std::vector<Overlay> overlays;  ///< of the one that was best in each frame, where options ask for them
-  std::size_t frames_run = 0;     ///< of all hypotheses together: those given up save theirs
+  /// Of the one that was best in each frame, as it was predicted before that frame's correction, where options ask for
+  /// them.
+  std::vector<Overlay> overlays;
+  std::vector<double> followed;  ///< how many hypotheses are, by frame
+  std::size_t frames_run = 0;    ///< of all hypotheses together: those given up save theirs
   std::string status = "ok";
 
   /// Of a hypothesis by frame; of "none of these" after the last hypothesis.
@@ -98,7 +103,37 @@ struct PosteriorCourse {
     const std::vector<double> of = last_log_posterior();
     return static_cast<std::size_t>(std::distance(of.begin(), std::max_element(of.begin(), of.end())));
   }
+
+  /// After a frame, by hypothesis.
+  std::vector<double> log_posterior_at(std::size_t frame) const {
+    std::vector<double> result;
+    for (const auto& of : log_posterior) {
+      result.push_back(of[frame]);
+    }
+    return result;
+  }
 };
+
+/// What the likelihood as printed makes of the pixels that differed from what was predicted (Schenck and Fox 2017:
+/// every pixel counts by itself, with delta = 0.50001), by hypothesis; "none of these" is not asked about. One that was
+/// given up has no probability.
+inline std::vector<double> probability_schenck2017(const PosteriorCourse& course) {
+  const double nats_per_pixel = decant::ImageLikelihood({.agreement = decant::agreement_schenck2017}).nats_per_pixel();
+  std::vector<double> probability;
+  double least = std::numeric_limits<double>::infinity(), total = 0;
+  for (const Evidence& of : course.evidence) {
+    least = of.frames == course.time.size() ? std::min(least, of.differing_before_px) : least;
+  }
+  for (const Evidence& of : course.evidence) {
+    const bool to_the_end = of.frames == course.time.size();
+    probability.push_back(to_the_end ? std::exp(nats_per_pixel * (least - of.differing_before_px)) : 0.0);
+    total += probability.back();
+  }
+  for (double& each : probability) {
+    each /= total;
+  }
+  return probability;
+}
 
 /// @param progress is told the share that is done, 0 .. 1.
 template <class CorrectorType>
@@ -131,6 +166,7 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
       if (!filter.given_up(k)) {
         const FrameReport& own = filter.report(k);
         Evidence& evidence = course.evidence[k];
+        ++evidence.frames;
         evidence.before = filter.posterior().misfit(k);
         evidence.differing_before_px += static_cast<double>(own.prior.differing_px());
         evidence.differing_after_px += static_cast<double>(own.posterior.differing_px());
@@ -139,11 +175,12 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
         evidence.relocated_ml += 1e6 * own.relocated_volume;
       }
     }
+    course.followed.push_back(static_cast<double>(filter.running()));
     course.log_none.push_back(filter.posterior().log_posterior_of_none());
     if (options.keep_overlays && !recording.cameras.empty()) {
       const auto& tracker = filter.tracker(filter.best());
       const bool has_mask = !recorded.masks.empty() && recorded.masks.front().camera == 0;
-      course.overlays.push_back(overlay_of(tracker.predicted(0), has_mask ? &tracker.observed(0) : nullptr));
+      course.overlays.push_back(overlay_of(tracker.predicted_before(0), has_mask ? &tracker.observed(0) : nullptr));
     }
     progress(static_cast<double>(frame + 1) / static_cast<double>(recording.frames));
   }
@@ -210,16 +247,6 @@ inline nlohmann::json course_json(const PosteriorCourse& course) {
   }
   json[PosteriorCourse::none_name] = column_json(probability.back());
   return json;
-}
-
-inline decant::LineChart course_chart(const std::string& title, const PosteriorCourse& course) {
-  decant::LineChart chart{title, "time [s]", "probability", {}, {}, {0, 1}};
-  const std::vector<std::vector<double>> probability = course.probability();
-  for (std::size_t k = 0; k < course.names.size(); ++k) {
-    chart.lines.push_back({course.names[k], course.time, probability[k]});
-  }
-  chart.lines.push_back({"none of these", course.time, probability.back(), true});
-  return chart;
 }
 
 }  // namespace example

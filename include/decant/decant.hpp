@@ -78,7 +78,9 @@
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
 #include <decant/hypothesis/executor.hpp>
+#include <decant/hypothesis/factored_filter.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/hypothesis/hypothesis_groups.hpp>
 #include <decant/hypothesis/independent_groups.hpp>
 #include <decant/hypothesis/posterior.hpp>
 #include <decant/hypothesis/thread_executor.hpp>

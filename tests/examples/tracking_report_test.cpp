@@ -46,7 +46,7 @@ TEST_CASE("tracking report: pictures are cut to the liquid of all frames and met
   };
   results[0].result.overlays = {Overlay(), labelled(3, 40)};
   results[1].result.overlays = {labelled(30, 88)};
-  const detail::Region region = detail::region_of_liquid(results, 100, 100);
+  const detail::Region region = detail::region_of_liquid(detail::film_sources(results), 100, 100);
   CHECK(region.top == 0);
   CHECK(region.left == 40 - 13);  // 8 and a twelfth of 60
   CHECK(region.top + region.height == 42 + 13);

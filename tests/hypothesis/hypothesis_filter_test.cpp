@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <vector>
 
@@ -135,6 +137,102 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
   CHECK_THROWS_WITH(filter.tracker(0), decant_test::contains("one that was not given up"));
   HypothesisFilter<DustTracker<OpenLoop<double>>> empty;
   CHECK(empty.track({0.1, {}, {}}).status == FrameStatus::BadInput);
+}
+
+TEST_CASE("hypothesis filter: a hypothesis about a part of the picture neither sees nor counts the rest") {
+  const PixelBox part{80, 20, 140, 120};
+  HypothesisFilterSettings settings;
+  settings.least_probability = 0;
+  HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
+  filter.add(falling_with<OpenLoop<double>>(-1), 0, {part});
+  filter.add(falling_with<OpenLoop<double>>(-1), 0, {PixelBox{500, 500, 600, 600}});  // nowhere
+  auto alone = falling_with<OpenLoop<double>>(-1);
+  FallingDust reality = falling_with<OpenLoop<double>>(-2).model();
+  double squared = 0, measured = 0;
+  for (int frame = 1; frame <= 5; ++frame) {
+    reality.step(1 / 30.0);
+    Mask mask = decant_test::seen(reality.dust);
+    const std::vector<CameraMask> only{{0, mask}};
+    REQUIRE(alone.track({frame / 30.0, {}, only}).status == FrameStatus::Ok);
+    const auto of = [&](const Mask& whole) -> Mask { return whole.block(20, 80, 100, 60); };
+    squared += SilhouetteCells(20).squared_difference(of(alone.predicted_before(0)), of(alone.observed(0)));
+    measured += SilhouetteCells(20).shares(of(alone.observed(0))).square().sum();
+    // somebody else's liquid beside it
+    mask.block(20, 0, 100, 60).setConstant(255);
+    mask.block(130, 80, 30, 60).setConstant(255);
+    const std::vector<CameraMask> masks{{0, mask}};
+    REQUIRE(filter.track({frame / 30.0, {}, masks}).status == FrameStatus::Ok);
+    CHECK((filter.tracker(0).observed(0).leftCols(80) == 0).all());
+    CHECK((filter.tracker(0).observed(0).bottomRows(40) == 0).all());
+  }
+  REQUIRE(measured > 5);
+  REQUIRE(squared > 1);
+  CHECK(filter.posterior().misfit(0).squared == Approx(squared).epsilon(1e-12));
+  CHECK(filter.posterior().misfit(0).measured == Approx(measured).epsilon(1e-12));
+  CHECK(filter.posterior().misfit(1).measured == 0);
+  CHECK_THROWS_WITH(filter.add(falling_with<OpenLoop<double>>(0), 0, {part, part}),
+                    decant_test::contains("as many as the tracker has"));
+}
+
+TEST_CASE("hypothesis filter: a hypothesis may be given up by its user") {
+  auto filter = after<OpenLoop<double>>(2);
+  const double behind = filter.log_posterior(2) - filter.log_posterior(3);
+  REQUIRE(filter.running() == 5);
+  filter.give_up(3);
+  CHECK(filter.running() == 4);
+  CHECK(filter.given_up(3));
+  CHECK(filter.probability(3) == 0);
+  CHECK(filter.log_posterior(filter.best()) - filter.log_posterior(3) ==
+        Approx(behind + filter.log_posterior(filter.best()) - filter.log_posterior(2)));
+  CHECK_NOTHROW(filter.give_up(3));
+}
+
+TEST_CASE("hypothesis filter: ten thousand frames do not underflow, whatever the paper's delta is") {
+  // A few grains that stay where they are, where a second hypothesis has them three pixels to the right
+  const auto resting = [](double to_the_right, double agreement) {
+    FallingDust model;
+    model.dust = decant_test::liquid_block<double>({to_the_right, 0, 0}, 1);
+    model.gravity = 0;
+    TrackerSettings settings;
+    settings.least_pixels = 1;
+    settings.likelihood.agreement = agreement;
+    DustTracker<OpenLoop<double>> tracker(model, {}, settings);
+    tracker.add_camera({PinholeCamera(150, 150, 19.5, 14.5, 40, 30), {}}, decant_test::before_the_block());
+    return tracker;
+  };
+  for (const double agreement : {agreement_schenck2017, 0.999}) {
+    HypothesisFilterSettings settings;
+    settings.least_probability = 0;
+    HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
+    filter.add(resting(0, agreement));
+    filter.add(resting(0.01, agreement));
+    auto seen_by = resting(0, agreement);
+    Mask mask;
+    seen_by.predict(seen_by.model(), 0, mask);
+    mask(0, 0) = mask(29, 39) = 255;
+    const std::vector<CameraMask> masks{{0, mask}};
+    std::array<double, 2> log_likelihood{};
+    for (int frame = 1; frame <= 10000; ++frame) {
+      REQUIRE(filter.track({frame / 30.0, {}, masks}).status == FrameStatus::Ok);
+      log_likelihood[0] += filter.report(0).log_likelihood;
+      log_likelihood[1] += filter.report(1).log_likelihood;
+    }
+    // as printed, each pixel of each frame a factor of its own: the product of them all would be 0
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Mask &predicted = filter.tracker(k).predicted_before(0), &observed = filter.tracker(k).observed(0);
+      double of_one_frame = 0;
+      for (Index i = 0; i < predicted.size(); ++i) {
+        of_one_frame += std::log(predicted.data()[i] == observed.data()[i] ? agreement : 1 - agreement);
+      }
+      CHECK(log_likelihood[k] == Approx(10000 * of_one_frame).epsilon(1e-9));
+      CHECK(std::exp(log_likelihood[1]) == 0);
+      CHECK(std::isfinite(filter.log_posterior(k)));
+    }
+    CHECK(log_likelihood[0] > log_likelihood[1]);
+    CHECK(filter.probability(0) + filter.probability(1) + filter.probability_of_none() == Approx(1));
+    CHECK(filter.probability(0) > 0.99);
+    CHECK(filter.log_posterior(1) > -1000);
+  }
 }
 
 TEST_CASE("hypothesis filter: the same bits for 1, 2 and 4 threads", "[threads]") {

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: MIT
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <random>
 #include <vector>
 
 #include <decant/hypothesis/posterior.hpp>
@@ -98,6 +102,51 @@ TEST_CASE("posterior: nothing was there, and one hypothesis had said so") {
   auto broken = seen({100, std::numeric_limits<double>::quiet_NaN()}, 1000);
   CHECK(broken.log_posterior_of_none() < 0);
   CHECK(sum_of(broken) == Approx(1));
+}
+
+TEST_CASE("posterior: what is stated comes true as often, however large errors are") {
+  // One of four predictions is right but for errors whose size nobody is told, from a hundredth of what the predictions
+  // differ by to ten times as much. Twenty errors, as many as the posterior takes there to be.
+  PosteriorSettings settings;
+  settings.none_prior = 0;
+  settings.least_squared = 1e-3;  // below what the smallest errors come to
+  constexpr int cases = 20000, count = 4, bins = 5;
+  const int errors = static_cast<int>(settings.independent_errors);
+  std::mt19937 random(17);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> log_size(std::log(0.01), std::log(10.0));
+  std::array<double, bins> stated{}, came_true{}, statements{};
+  for (int k = 0; k < cases; ++k) {
+    const double size = std::exp(log_size(random));
+    const auto right = static_cast<std::size_t>(random() % count);
+    std::array<double, count> squared{};
+    for (int error = 0; error < errors; ++error) {
+      std::array<double, count> prediction{};
+      for (double& each : prediction) {
+        each = normal(random);
+      }
+      const double measured = prediction[right] + size * normal(random);
+      for (std::size_t h = 0; h < count; ++h) {
+        squared[h] += (prediction[h] - measured) * (prediction[h] - measured);
+      }
+    }
+    const Posterior posterior = seen({squared.begin(), squared.end()}, 1, settings);
+    for (std::size_t h = 0; h < count; ++h) {
+      const double probability = posterior.probability(h);
+      const auto bin = static_cast<std::size_t>(std::min(bins - 1, static_cast<int>(bins * probability)));
+      stated[bin] += probability;
+      came_true[bin] += h == right ? 1 : 0;
+      ++statements[bin];
+    }
+  }
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    const double mean = stated[bin] / statements[bin];
+    INFO(mean << " stated " << statements[bin] << " times");
+    CHECK(statements[bin] > 300);
+    // four deviations of a frequency; 0.01 for sizes having ends, which the posterior does not know
+    CHECK(came_true[bin] / statements[bin] ==
+          Approx(mean).margin(0.01 + 4 * std::sqrt(mean * (1 - mean) / statements[bin])));
+  }
 }
 
 TEST_CASE("posterior: ten thousand frames neither underflow nor forget") {

@@ -73,6 +73,30 @@ TEST_CASE("value estimate: shares of a normal density, and back") {
   CHECK(density.share_below(20) == 1);
 }
 
+TEST_CASE("value estimate: a density as a curve") {
+  // a deviation of 2, in uneven steps
+  const std::vector<double> values{0, 1, 2, 4, 5, 6, 7, 8, 10, 11, 12, 13, 14, 16, 17, 18, 20};
+  std::vector<double> log_density;
+  for (const double value : values) {
+    log_density.push_back(3 - 0.5 * (value - 9.3) * (value - 9.3) / 4);
+  }
+  const ValueDensity density(values, log_density);
+  const double highest = 1 / std::sqrt(8 * std::acos(-1.0));
+  double total = 0;
+  for (double value = 0.005; value < 20; value += 0.01) {
+    const double z = (value - 9.3) / 2;
+    CHECK(density.density(value) == Approx(highest * std::exp(-0.5 * z * z)).margin(0.02 * highest));
+    total += 0.01 * density.density(value);
+  }
+  CHECK(total == Approx(1).margin(1e-3));
+  CHECK(density.density(-0.1) == 0);
+  CHECK(density.density(20.1) == 0);
+  CHECK(density.density(20) >= 0);
+  const std::vector<double> one{7}, any{-3};
+  CHECK(ValueDensity(one, any).density(7) == 0);
+  CHECK(estimate_value(density, 0.5).high == estimate_value(values, log_density, 0.5).high);
+}
+
 TEST_CASE("value estimate: what is most probable at an end is in its interval") {
   std::vector<double> values, falling, rising;
   for (int k = 0; k <= 10; ++k) {

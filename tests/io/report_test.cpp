@@ -100,6 +100,31 @@ TEST_CASE("report: an axis shows the numbers that it is asked to show") {
   CHECK(decant::detail::chart_svg(chart).find("data-high=\"9\"") != std::string::npos);
 }
 
+TEST_CASE("report: a line has a colour of its own, or another one's") {
+  const decant::LineChart chart{
+      "t", "x", "y", {{"a", {0, 1}, {0, 1}}, {"b", {0, 1}, {1, 2}}, {"of b", {0, 1}, {2, 3}, true, 1}}};
+  const std::string svg = decant::detail::chart_svg(chart), own = decant::detail::series_color(1);
+  const auto times = [&](const std::string& colour) {
+    std::size_t count = 0;
+    for (std::size_t at = svg.find(colour); at != std::string::npos; at = svg.find(colour, at + 1)) {
+      ++count;
+    }
+    return count;
+  };
+  CHECK(times(own) == 2);
+  CHECK(times(decant::detail::series_color(0)) == 1);
+  CHECK(times(decant::detail::series_color(2)) == 0);
+}
+
+TEST_CASE("report: only charts over time follow a film") {
+  decant::LineChart chart{"t", "amount [ml]", "y", {{"a", {5, 6}, {0.6, 0.7}, false}}};
+  const auto svg = [&] { return decant::detail::chart_svg(chart); };
+  CHECK(svg().find(" data-low=\"5\" data-high=\"6\"") != std::string::npos);
+  chart.over_time = false;
+  CHECK(svg().find("data-low") == std::string::npos);
+  CHECK(svg().find("<path class=\"line\"") != std::string::npos);
+}
+
 TEST_CASE("report: text is escaped and nothing is fetched from elsewhere") {
   const decant_test::TemporaryFolder folder("report");
   decant::HtmlReport report("a <b> & c");

@@ -15,6 +15,8 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/image.hpp>
+#include <decant/core/pixel_box.hpp>
 #include <decant/core/subnormal.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
@@ -128,17 +130,22 @@ class HypothesisFilter {
 
   /// Adds a hypothesis. All trackers have the same cameras and bodies by number, and one time.
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
+  /// @param region by camera, the part of its picture that this hypothesis is about: elsewhere its tracker sees no
+  /// liquid, and no misfits are counted; cells begin at its corner. Without, all of every picture.
   /// @return its number, counting from 0.
-  std::size_t add(Tracker tracker, double log_prior = 0) {
-    return add([&] { return std::move(tracker); }, log_prior);
+  std::size_t add(Tracker tracker, double log_prior = 0, std::vector<PixelBox> region = {}) {
+    return add([&] { return std::move(tracker); }, log_prior, std::move(region));
   }
   /// The same, for a tracker that make() gives, which is called only where the hypothesis is kept.
   template <std::invocable Make>
-  std::size_t add(Make&& make, double log_prior = 0) {
+  std::size_t add(Make&& make, double log_prior = 0, std::vector<PixelBox> region = {}) {
     Hypothesis hypothesis;
     if (hypotheses_.size() % executor_.processes() == executor_.process()) {
       hypothesis.tracker.emplace(make());
+      expects(region.empty() || region.size() == hypothesis.tracker->cameras(),
+              "HypothesisFilter: cameras of the region", "as many as the tracker has", region.size());
     }
+    hypothesis.region = std::move(region);
     const std::size_t number = posterior_.add(log_prior);
     hypotheses_.push_back(std::move(hypothesis));
     return number;
@@ -163,7 +170,7 @@ class HypothesisFilter {
             return JobResult{};
           }
           const SubnormalsAsZero quick;
-          hypothesis.last.report = hypothesis.tracker->track(frame);
+          hypothesis.last.report = follow(frame, hypothesis);
           return detail::numbers_of({hypothesis.last.report, misfit_of(frame, hypothesis)});
         },
         tell_nobody);
@@ -193,6 +200,13 @@ class HypothesisFilter {
                                 : posterior_.log_posterior(hypothesis);
   }
 
+  /// Follows a hypothesis no further, as one that has become too improbable.
+  void give_up(std::size_t hypothesis) {
+    if (!given_up(hypothesis)) {
+      drop(hypothesis, posterior_.log_posterior(best()) - posterior_.log_posterior(hypothesis));
+    }
+  }
+
   /// Among all hypotheses and "none of these"; those given up have none.
   double probability(std::size_t hypothesis) const { return posterior_.probability(hypothesis); }
   double probability_of_none() const noexcept { return posterior_.probability_of_none(); }
@@ -218,7 +232,38 @@ class HypothesisFilter {
     detail::HypothesisFrame last{};
     bool given_up = false;
     double behind = 0;  ///< the most probable one, when this one was given up [nat]
+    std::vector<PixelBox> region{};
+    std::vector<Mask> cropped{};  ///< the frame's masks, without what is outside of the region
   };
+
+  static PixelBox region_of(const Hypothesis& hypothesis, std::size_t camera, const PixelBox& image) noexcept {
+    return hypothesis.region.empty() ? image : hypothesis.region[camera].intersection(image);
+  }
+
+  static FrameReport follow(const TrackerFrame& frame, Hypothesis& hypothesis) noexcept {
+    if (hypothesis.region.empty()) {
+      return hypothesis.tracker->track(frame);
+    }
+    std::vector<CameraMask> masks;
+    masks.reserve(frame.masks.size());
+    hypothesis.cropped.resize(std::max(hypothesis.cropped.size(), frame.masks.size()));
+    for (std::size_t k = 0; k < frame.masks.size(); ++k) {
+      const ConstMaskView& whole = frame.masks[k].mask;
+      Mask& cropped = hypothesis.cropped[k];
+      cropped.setZero(whole.rows(), whole.cols());
+      if (frame.masks[k].camera < hypothesis.region.size()) {
+        const PixelBox box = region_of(hypothesis, frame.masks[k].camera, PixelBox::of(whole));
+        part_of(cropped, box) = part_of(whole, box);
+      }
+      masks.push_back({frame.masks[k].camera, cropped});
+    }
+    return hypothesis.tracker->track({frame.time, frame.poses, masks, frame.cameras});
+  }
+
+  template <class Picture>
+  static auto part_of(Picture& picture, const PixelBox& box) noexcept {
+    return box.empty() ? picture.block(0, 0, 0, 0) : picture.block(box.v_begin, box.u_begin, box.height(), box.width());
+  }
 
   Misfit misfit_of(const TrackerFrame& frame, const Hypothesis& hypothesis) const noexcept {
     Misfit misfit;
@@ -227,12 +272,21 @@ class HypothesisFilter {
     }
     for (const CameraMask& mask : frame.masks) {
       if (hypothesis.tracker->believes(mask.camera)) {
-        const auto observed = cells_.shares(hypothesis.tracker->observed(mask.camera));
-        const auto predicted = cells_.shares(hypothesis.tracker->predicted_before(mask.camera));
+        const Mask& seen = hypothesis.tracker->observed(mask.camera);
+        const PixelBox box = region_of(hypothesis, mask.camera, PixelBox::of(seen));
+        const auto observed = cells_.shares(part_of(seen, box));
+        const auto predicted = cells_.shares(part_of(hypothesis.tracker->predicted_before(mask.camera), box));
         misfit += {(predicted - observed).square().sum(), observed.square().sum()};
       }
     }
     return misfit;
+  }
+
+  void drop(std::size_t k, double behind) noexcept {
+    hypotheses_[k].tracker.reset();
+    hypotheses_[k].given_up = true;
+    hypotheses_[k].behind = behind;
+    posterior_.exclude(k);
   }
 
   void give_up() noexcept {
@@ -242,12 +296,6 @@ class HypothesisFilter {
     if (!one_stands) {
       return;
     }
-    const auto drop = [&](std::size_t k, double behind) {
-      hypotheses_[k].tracker.reset();
-      hypotheses_[k].given_up = true;
-      hypotheses_[k].behind = behind;
-      posterior_.exclude(k);
-    };
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
       if (!hypotheses_[k].given_up && failed(hypotheses_[k])) {
         drop(k, std::numeric_limits<double>::infinity());

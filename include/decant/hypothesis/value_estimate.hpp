@@ -86,6 +86,12 @@ class ValueDensity {
     return share;
   }
 
+  /// The density at a value [1 / its unit], 0 outside of the values; 0 everywhere if there is only one of them, which
+  /// then is certain.
+  double density(double value) const noexcept {
+    return value >= values_.front() && value <= values_.back() ? pieces * density_near(value) : 0.0;
+  }
+
   /// Whether one of the values is so near to an end of the range that the quantity may lie beyond it: within half of
   /// the outermost gap.
   bool near_end(double low, double high) const noexcept {
@@ -168,14 +174,17 @@ class ValueDensity {
   double mean_ = 0;
 };
 
-/// Mean, median and interval of a ValueDensity. @param confidence in (0, 1). Throws std::invalid_argument as that does,
-/// and for another confidence.
-inline ValueEstimate estimate_value(std::span<const double> values, std::span<const double> log_density,
-                                    double confidence = 0.9) {
+/// Mean, median and interval of a density. @param confidence in (0, 1). Throws std::invalid_argument otherwise.
+inline ValueEstimate estimate_value(const ValueDensity& density, double confidence = 0.9) {
   expects(confidence > 0 && confidence < 1, "estimate_value: confidence", "in (0, 1)", confidence);
-  const ValueDensity density(values, log_density);
   const auto [low, high] = density.interval(confidence);
   return {density.mean(), density.quantile(0.5), low, high, density.near_end(low, high)};
+}
+
+/// The same from logarithms of a density, see ValueDensity. Throws std::invalid_argument as that does, too.
+inline ValueEstimate estimate_value(std::span<const double> values, std::span<const double> log_density,
+                                    double confidence = 0.9) {
+  return estimate_value(ValueDensity(values, log_density), confidence);
 }
 
 }  // namespace decant::inline DECANT_TARGET

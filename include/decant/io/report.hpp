@@ -29,6 +29,7 @@ struct LineChart {
     std::string name;
     std::vector<double> x, y;  ///< of equal length; the line breaks where a number is not finite
     bool dashed = false;
+    int colour_of = -1;  ///< the line, by its place in the chart, whose colour it has; -1: one of its own
   };
 
   std::string title;
@@ -37,6 +38,7 @@ struct LineChart {
   std::vector<Line> lines;
   std::vector<double> x_within{};  ///< numbers that the axis shows in any case, such as where a film begins and ends
   std::vector<double> y_within{};  ///< likewise, such as 0 and 1 for a share
+  bool over_time = true;           ///< x is the time that the report's film has, which is marked in the chart
 };
 
 /// Groups of bars that stand on a common axis.
@@ -160,7 +162,7 @@ inline LineChart::Line thinned(const LineChart::Line& line, std::size_t bins) {
   if (line.x.size() <= 2 * bins) {
     return line;
   }
-  LineChart::Line out{line.name, {}, {}, line.dashed};
+  LineChart::Line out{line.name, {}, {}, line.dashed, line.colour_of};
   for (std::size_t bin = 0; bin < bins; ++bin) {
     const std::size_t begin = bin * line.x.size() / bins, end = (bin + 1) * line.x.size() / bins;
     std::size_t low = begin, high = begin;
@@ -193,7 +195,8 @@ inline const char* series_color(std::size_t n) {
 
 inline std::string line_style(const LineChart& chart, std::size_t n) {
   const LineChart::Line& line = chart.lines[n];
-  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + series_color(n) + "\"" +
+  const std::size_t colour = line.colour_of < 0 ? n : static_cast<std::size_t>(line.colour_of);
+  return " class=\"line\" data-name=\"" + html_text(line.name) + "\" stroke=\"" + series_color(colour) + "\"" +
          (line.dashed ? " stroke-dasharray=\"6 4\"" : "");
 }
 
@@ -326,8 +329,10 @@ inline std::string chart_svg(const LineChart& chart, const ChartShape& shape = w
   const auto x_at = [&](double x) { return left + (x - x_low) / (x_high - x_low) * (width - left - right); };
   const auto point = ChartFrame::point;
   std::string svg =
-      frame.begin(chart.title, " data-low=\"" + number_text(x_low) + "\" data-high=\"" + number_text(x_high) +
-                                   "\" data-left=\"" + point(left) + "\" data-right=\"" + point(width - right) + "\"");
+      frame.begin(chart.title, !chart.over_time ? std::string()
+                                                : " data-low=\"" + number_text(x_low) + "\" data-high=\"" +
+                                                      number_text(x_high) + "\" data-left=\"" + point(left) +
+                                                      "\" data-right=\"" + point(width - right) + "\"");
   for (const double x : x_ticks.values()) {
     if (x >= x_low - 1e-9 * x_ticks.step && x <= x_high + 1e-9 * x_ticks.step) {
       svg += "<line class=\"grid\" x1=\"" + point(x_at(x)) + "\" x2=\"" + point(x_at(x)) + "\" y1=\"" + point(top) +
