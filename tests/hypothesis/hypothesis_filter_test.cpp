@@ -169,6 +169,7 @@ TEST_CASE("hypothesis filter: a hypothesis about a part of the picture neither s
   CHECK(filter.posterior().misfit(0).squared == Approx(squared).epsilon(1e-12));
   CHECK(filter.posterior().misfit(0).measured == Approx(measured).epsilon(1e-12));
   CHECK(filter.posterior().misfit(1).measured == 0);
+  CHECK(filter.posterior().misfit(1).squared == 0);  // its dust is predicted elsewhere
   CHECK_THROWS_WITH(filter.add(falling_with<OpenLoop<double>>(0), 0, {part, part}),
                     decant_test::contains("as many as the tracker has"));
 }
