@@ -140,7 +140,7 @@ TEST_CASE("hypothesis filter: one whose model fails is given up, but not the las
 }
 
 TEST_CASE("hypothesis filter: a hypothesis about a part of the picture neither sees nor counts the rest") {
-  const PixelBox part{80, 20, 140, 120};
+  const PixelBox part{60, 0, 140, 120};  // all of the dust, and whole cells
   HypothesisFilterSettings settings;
   settings.least_probability = 0;
   HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
@@ -154,15 +154,15 @@ TEST_CASE("hypothesis filter: a hypothesis about a part of the picture neither s
     Mask mask = decant_test::seen(reality.dust);
     const std::vector<CameraMask> only{{0, mask}};
     REQUIRE(alone.track({frame / 30.0, {}, only}).status == FrameStatus::Ok);
-    const auto of = [&](const Mask& whole) -> Mask { return whole.block(20, 80, 100, 60); };
+    const auto of = [&](const Mask& whole) -> Mask { return whole.block(0, 60, 120, 80); };
     squared += SilhouetteCells(20).squared_difference(of(alone.predicted_before(0)), of(alone.observed(0)));
     measured += SilhouetteCells(20).shares(of(alone.observed(0))).square().sum();
     // somebody else's liquid beside it
-    mask.block(20, 0, 100, 60).setConstant(255);
+    mask.block(0, 0, 100, 60).setConstant(255);
     mask.block(130, 80, 30, 60).setConstant(255);
     const std::vector<CameraMask> masks{{0, mask}};
     REQUIRE(filter.track({frame / 30.0, {}, masks}).status == FrameStatus::Ok);
-    CHECK((filter.tracker(0).observed(0).leftCols(80) == 0).all());
+    CHECK((filter.tracker(0).observed(0).leftCols(60) == 0).all());
     CHECK((filter.tracker(0).observed(0).bottomRows(40) == 0).all());
   }
   REQUIRE(measured > 5);
@@ -170,6 +170,7 @@ TEST_CASE("hypothesis filter: a hypothesis about a part of the picture neither s
   CHECK(filter.posterior().misfit(0).squared == Approx(squared).epsilon(1e-12));
   CHECK(filter.posterior().misfit(0).measured == Approx(measured).epsilon(1e-12));
   CHECK(filter.posterior().misfit(1).measured == 0);
+  CHECK(filter.posterior().misfit(1).squared == 0);  // its dust is predicted elsewhere
   CHECK_THROWS_WITH(filter.add(falling_with<OpenLoop<double>>(0), 0, {part, part}),
                     decant_test::contains("as many as the tracker has"));
 }
@@ -196,6 +197,7 @@ TEST_CASE("hypothesis filter: ten thousand frames do not underflow, whatever the
     TrackerSettings settings;
     settings.least_pixels = 1;
     settings.likelihood.agreement = agreement;
+    settings.threads = {1};
     DustTracker<OpenLoop<double>> tracker(model, {}, settings);
     tracker.add_camera({PinholeCamera(150, 150, 19.5, 14.5, 40, 30), {}}, decant_test::before_the_block());
     return tracker;
@@ -203,6 +205,7 @@ TEST_CASE("hypothesis filter: ten thousand frames do not underflow, whatever the
   for (const double agreement : {agreement_schenck2017, 0.999}) {
     HypothesisFilterSettings settings;
     settings.least_probability = 0;
+    settings.threads = {1};
     HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
     filter.add(resting(0, agreement));
     filter.add(resting(0.01, agreement));
