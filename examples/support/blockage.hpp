@@ -178,8 +178,7 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
     tracking.spacing = 2 * narrowest / options.particles_across;
   }
   result.spacing = tracking.spacing;
-  const TrackingModel open = model_of<TrackingParts>(recording, tracking);
-  std::vector<NamedModel> models{{"none", open, 0}};
+  std::vector<NamedModel> models{{"none", model_of<TrackingParts>(recording, tracking), 0}};
   result.leg.emplace_back();
   result.opening.push_back(1);
   std::vector<double> openings{0};
@@ -188,12 +187,13 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
     for (const double opening : openings) {
       // configurations are as probable as each other, whatever the number of openings that one stands for
       const double log_prior = opening > 0 ? -std::log(static_cast<double>(options.openings.size())) : 0;
-      models.push_back({result.legs[leg].name + "_" + std::to_string(std::lround(100 * opening)), open, log_prior});
-      const TriangleMesh blockage = pipe_blockage(result.legs[leg].section, opening, 2 * tracking.spacing);
-      models.back().model.add_body(
-          "blockage", blockage,
-          shifted(recording.bodies[body].motion, models.back().model.time() - recording.timestamps.front(),
-                  models.back().model, static_cast<BodyId>(body)));
+      // One body with the junction: walls of several bodies add up, and where one is behind the other's that makes a
+      // hole far narrower than it is.
+      Recording blocked = recording;
+      blocked.bodies[body].mesh =
+          joined(recording.bodies[body].mesh, pipe_blockage(result.legs[leg].section, opening, 2 * tracking.spacing));
+      models.push_back({result.legs[leg].name + "_" + std::to_string(std::lround(100 * opening)),
+                        model_of<TrackingParts>(blocked, tracking), log_prior});
       result.leg.emplace_back(leg);
       result.opening.push_back(opening);
     }

@@ -139,19 +139,19 @@ HypothesisFilterSettings for_dust() {
   settings.cell_px = 12;  // 640 is no multiple of it
   settings.least_probability = 0;
   settings.posterior.least_squared = 2;  // grains are few
-  settings.threads = {1};
   return settings;
 }
 
 template <class Scalar, class CorrectorType = OpenLoop<Scalar>>
 FactoredFilter<DustPourTracker<Scalar, CorrectorType>> factored_dust(HypothesisFilterSettings settings = for_dust(),
-                                                                     const Vector3<double>& second = {apart, 0, 0}) {
+                                                                     const Vector3<double>& second = {apart, 0, 0},
+                                                                     int threads = 1) {
   return FactoredFilter<DustPourTracker<Scalar, CorrectorType>>(
       groups_of_dust(settings.cell_px, second), {{0, 0.3, -0.2}, {0.1, 0}},
       [&](std::span<const std::optional<std::size_t>> chosen) {
         return dust_tracker<Scalar, CorrectorType>(chosen[0], chosen[1], second);
       },
-      settings);
+      settings, ThreadExecutor{{threads}});
 }
 
 /// What is seen, frame by frame: neither of the hypotheses, and clutter on the wall in between and behind.
@@ -375,9 +375,7 @@ TEST_CASE("factored filter: before anything is seen there is the prior, and the 
 
 TEST_CASE("factored filter: the same bits for 1, 2 and 4 threads", "[threads]") {
   const auto posterior_with = [](int threads) {
-    HypothesisFilterSettings settings = for_dust();
-    settings.threads = {threads};
-    auto factored = factored_dust<double>(settings);
+    auto factored = factored_dust<double>(for_dust(), {apart, 0, 0}, threads);
     double time = 0;
     for (const Mask& mask : seen_dust<double>(4)) {
       time += 1 / 30.0;

@@ -205,7 +205,6 @@ TEST_CASE("hypothesis filter: ten thousand frames do not underflow, whatever the
   for (const double agreement : {agreement_schenck2017, 0.999}) {
     HypothesisFilterSettings settings;
     settings.least_probability = 0;
-    settings.threads = {1};
     HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
     filter.add(resting(0, agreement));
     filter.add(resting(0.01, agreement));
