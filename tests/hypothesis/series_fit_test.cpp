@@ -78,7 +78,7 @@ TEST_CASE("series fit: the mean of a few readings has Student's interval") {
   const double half = 1.833 * std::sqrt(squares / 9 / 10);
   const std::vector<MeasuredChannel> measured{{readings, {.deviation = 1e-4}}};
   const SeriesFit fit =
-      fit_series(StraightLine{}, offsets(2, 6, 81), steps(0, 9, 10), measured, ThreadExecutor{{1}}, 0);
+      fit_series(StraightLine{}, offsets(2, 6, 81), steps(0, 9, 10), measured, ThreadExecutor{{1}}, {.none_prior = 0});
   const ValueEstimate estimate = offset_of(fit);
   CHECK(estimate.median == Approx(mean).margin(0.005));
   CHECK(estimate.low == Approx(mean - half).margin(0.01));
@@ -100,7 +100,8 @@ TEST_CASE("series fit: intervals hold what they say although errors last for man
     for (const bool told_independent : {false, true}) {
       const std::vector<MeasuredChannel> measured{
           {noise, {.deviation = 0.1, .readings_per_error = told_independent ? 1.0 : 0.0}}};
-      const SeriesFit fit = fit_series(StraightLine{}, offsets(-2, 2, 161), times, measured, ThreadExecutor{{1}}, 0);
+      const SeriesFit fit =
+          fit_series(StraightLine{}, offsets(-2, 2, 161), times, measured, ThreadExecutor{{1}}, {.none_prior = 0});
       const ValueEstimate estimate = offset_of(fit);
       held[told_independent ? 1 : 0] += estimate.low <= 0 && 0 <= estimate.high ? 1 : 0;
     }
@@ -179,6 +180,13 @@ TEST_CASE("series fit: none of these, and hypotheses that cannot be predicted") 
   const SeriesFit found = fit_series(StraightLine{}, right, times, measured, ThreadExecutor{{1}});
   CHECK(found.posterior.probability(1) > 0.99);
   CHECK(found.best()[0].back() == Approx(0.1));
+  // what is known beforehand counts once
+  const SeriesFit told =
+      fit_series(StraightLine{}, right, times, measured, ThreadExecutor{{1}}, {.log_prior = {7, 0, 0}});
+  const auto lead = [](const SeriesFit& fit) {
+    return fit.posterior.log_posterior(0) - fit.posterior.log_posterior(1);
+  };
+  CHECK(lead(told) == Approx(lead(found) + 7));
 }
 
 TEST_CASE("series fit: what cannot be weighed is refused") {
@@ -190,6 +198,8 @@ TEST_CASE("series fit: what cannot be weighed is refused") {
     return fit_series(StraightLine{}, std::move(hypotheses), times, measured, ThreadExecutor{{1}});
   };
   CHECK_THROWS_WITH(fit({}, good), Catch::Contains("number of hypotheses"));
+  CHECK_THROWS_WITH(fit_series(StraightLine{}, {{1, 1}}, times, good, ThreadExecutor{{1}}, {.log_prior = {0, 0}}),
+                    Catch::Contains("number of priors"));
   CHECK_THROWS_WITH(fit({{1, 1}}, none), Catch::Contains("number of channels"));
   CHECK_THROWS_WITH(fit({{1, 1}}, short_one), Catch::Contains("that of times"));
   CHECK_THROWS_WITH(fit({{1, 1}}, empty), Catch::Contains("readings"));

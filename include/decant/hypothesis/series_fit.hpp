@@ -27,6 +27,12 @@ struct MeasuredChannel {
   ChannelNoise noise{};          ///< readings_per_error 0: to be found from what the best prediction is off by
 };
 
+struct SeriesFitSettings {
+  double none_prior = 0.05;  ///< of "none of these", see PosteriorSettings
+  /// By hypothesis, up to a constant [nat]; empty: all are as probable beforehand.
+  std::vector<double> log_prior{};
+};
+
 /// Hypotheses, what they predicted, and what that is worth.
 struct SeriesFit {
   std::vector<std::vector<double>> hypotheses{};
@@ -65,18 +71,20 @@ inline double readings_in(const MeasuredChannel& channel) {
       std::count_if(channel.values.begin(), channel.values.end(), [](double value) { return std::isfinite(value); }));
 }
 
-inline Posterior weigh_series(const SeriesFit& fit, std::span<const MeasuredChannel> measured, double none_prior) {
+inline Posterior weigh_series(const SeriesFit& fit, std::span<const MeasuredChannel> measured,
+                              const SeriesFitSettings& settings) {
   const std::vector<SeriesMisfit> misfits = series_misfits(fit.noise);
   const auto evidence = [&](std::size_t channel) { return misfits[channel].evidence(readings_in(measured[channel])); };
   const EvidenceSettings first = evidence(0);
-  Posterior posterior({first.independent_errors, first.least_squared, first.hopeless_share, none_prior});
+  Posterior posterior({first.independent_errors, first.least_squared, first.hopeless_share, settings.none_prior});
   for (std::size_t channel = 1; channel < measured.size(); ++channel) {
     posterior.add_source(evidence(channel));
   }
-  for (const auto& predicted : fit.predicted) {
-    const std::size_t hypothesis = posterior.add();
+  for (std::size_t hypothesis = 0; hypothesis < fit.predicted.size(); ++hypothesis) {
+    posterior.add(settings.log_prior.empty() ? 0.0 : settings.log_prior[hypothesis]);
     for (std::size_t channel = 0; channel < measured.size(); ++channel) {
-      posterior.observe(hypothesis, misfits[channel].misfit(predicted[channel], measured[channel].values), channel);
+      const std::vector<double>& predicted = fit.predicted[hypothesis][channel];
+      posterior.observe(hypothesis, misfits[channel].misfit(predicted, measured[channel].values), channel);
     }
   }
   return posterior;
@@ -84,16 +92,18 @@ inline Posterior weigh_series(const SeriesFit& fit, std::span<const MeasuredChan
 
 }  // namespace detail
 
-/// Weighs hypotheses, all as probable beforehand, by recorded channels: predictions are jobs of the executor, the rest
+/// Weighs hypotheses by recorded channels: predictions are jobs of the executor, the rest
 /// takes next to no time. For readings that come one by one, feed a Posterior with SeriesMisfit.
 /// @param hypotheses parameters of the model. @param times of the readings [s], increasing. @param measured in the
-/// order of the model's channels. @param none_prior of "none of these", see PosteriorSettings.
+/// order of the model's channels.
 /// Throws std::invalid_argument if there is nothing to weigh or by, if numbers of channels or readings disagree, or if
 /// no hypothesis could be predicted and errors were to be found; and whatever the model throws.
 template <SeriesModel Model, Executor E>
 SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypotheses, std::span<const double> times,
-                     std::span<const MeasuredChannel> measured, E&& executor, double none_prior = 0.05) {
+                     std::span<const MeasuredChannel> measured, E&& executor, const SeriesFitSettings& settings = {}) {
   expects(!hypotheses.empty(), "fit_series: number of hypotheses", "at least 1", 0);
+  expects(settings.log_prior.empty() || settings.log_prior.size() == hypotheses.size(), "fit_series: number of priors",
+          "that of hypotheses", settings.log_prior.size());
   expects(!measured.empty(), "fit_series: number of channels", "at least 1", 0);
   SeriesFit fit;
   fit.hypotheses = std::move(hypotheses);
@@ -133,7 +143,7 @@ SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypoth
     for (ChannelNoise& noise : fit.noise) {
       noise.readings_per_error = asked(noise) ? 1 : noise.readings_per_error;
     }
-    const Posterior first = detail::weigh_series(fit, measured, 0);
+    const Posterior first = detail::weigh_series(fit, measured, settings);
     expects(!first.excluded(first.best()), "fit_series: hypotheses that could be predicted", "at least 1", 0);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       if (asked(given[channel])) {
@@ -145,7 +155,7 @@ SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypoth
       }
     }
   }
-  fit.posterior = detail::weigh_series(fit, measured, none_prior);
+  fit.posterior = detail::weigh_series(fit, measured, settings);
   return fit;
 }
 
