@@ -157,4 +157,35 @@ inline DrainFit fit_discharge(const DrainingTank& tank, const DrainRecord& recor
   return fit;
 }
 
+/// How a fit's coefficient would have been known while the tank drained, reading by reading.
+struct DrainCourse {
+  std::vector<double> time;  ///< [s]
+  std::vector<decant::ValueEstimate> coefficient;
+};
+
+/// @param every how many readings there are from one estimate to the next.
+inline DrainCourse follow_discharge(const DrainFit& fit, const DrainRecord& record, std::size_t every) {
+  const decant::SeriesMisfit level(fit.series.noise[0]);
+  const decant::EvidenceSettings worth = level.evidence(static_cast<double>(record.time.size()));
+  decant::Posterior posterior({worth.independent_errors, worth.least_squared, worth.hopeless_share});
+  std::vector<double> values, log_posterior(fit.series.hypotheses.size());
+  for (std::size_t k = 0; k < fit.series.hypotheses.size(); ++k) {
+    posterior.add(fit.series.log_prior[k]);
+    values.push_back(fit.series.hypotheses[k][0]);
+  }
+  DrainCourse course;
+  for (std::size_t reading = 0; reading < record.time.size(); ++reading) {
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      posterior.observe(k, level.misfit(fit.series.predicted[k][0][reading], record.level[reading]));
+      log_posterior[k] = posterior.log_posterior(k);
+    }
+    if ((reading + 1) % every == 0) {
+      const decant::Marginal coefficient = decant::marginal(values, log_posterior);
+      course.time.push_back(record.time[reading]);
+      course.coefficient.push_back(decant::estimate_value(coefficient.values, coefficient.log_density));
+    }
+  }
+  return course;
+}
+
 }  // namespace example

@@ -7,6 +7,7 @@
 
 #include <decant/hypothesis/posterior.hpp>
 #include <decant/hypothesis/series_misfit.hpp>
+#include <decant/hypothesis/value_estimate.hpp>
 
 #include "catch.hpp"
 
@@ -64,6 +65,20 @@ TEST_CASE("series misfit: where predictions are as good as the sensor it is the 
   CHECK(posterior.probability(0) > 0.99);
 }
 
+TEST_CASE("series misfit: one reading, with a deviation that was measured on a few others, has Student's density") {
+  const SeriesMisfit level({.deviation = 2, .measured_on = 8});
+  const EvidenceSettings worth = level.evidence(1);
+  std::vector<double> values, log_density;
+  const Posterior posterior({worth.independent_errors, worth.least_squared, worth.hopeless_share});
+  for (double value = -40; value <= 60; value += 0.5) {
+    values.push_back(value);
+    log_density.push_back(posterior.log_likelihood(level.misfit(value, 10).squared));
+  }
+  const ValueEstimate estimate = estimate_value(values, log_density);
+  CHECK(estimate.low == Approx(10 - 2 * 1.860).margin(0.05));  // t of 0.95 with 8 degrees of freedom
+  CHECK(estimate.high == Approx(10 + 2 * 1.860).margin(0.05));
+}
+
 TEST_CASE("series misfit: a sensor that is asked twice as often says no more if its readings err together") {
   const auto lead = [](int times_as_often) {
     const SeriesMisfit mass({.deviation = 0.002, .readings_per_error = 4.0 * times_as_often});
@@ -112,6 +127,7 @@ TEST_CASE("series misfit: how many readings err together") {
 TEST_CASE("series misfit: numbers out of range are refused") {
   CHECK_THROWS_WITH(SeriesMisfit({.deviation = 0}), Catch::Contains("deviation"));
   CHECK_THROWS_WITH(SeriesMisfit({.readings_per_error = 0.5}), Catch::Contains("readings_per_error"));
+  CHECK_THROWS_WITH(SeriesMisfit({.measured_on = -1}), Catch::Contains("measured_on"));
   CHECK_THROWS_WITH(SeriesMisfit({.idle = missing}), Catch::Contains("idle"));
   CHECK_THROWS_WITH(SeriesMisfit(ChannelNoise{}).evidence(0), Catch::Contains("readings"));
   const std::vector<double> two{1, 2}, three{1, 2, 3};

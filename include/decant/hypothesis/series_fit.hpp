@@ -36,6 +36,7 @@ struct SeriesFitSettings {
 /// Hypotheses, what they predicted, and what that is worth.
 struct SeriesFit {
   std::vector<std::vector<double>> hypotheses{};
+  std::vector<double> log_prior{};  ///< by hypothesis [nat]
   /// By hypothesis and channel.
   std::vector<std::vector<std::vector<double>>> predicted{};
   std::vector<ChannelNoise> noise{};  ///< by channel, as it was used
@@ -71,17 +72,16 @@ inline double readings_in(const MeasuredChannel& channel) {
       std::count_if(channel.values.begin(), channel.values.end(), [](double value) { return std::isfinite(value); }));
 }
 
-inline Posterior weigh_series(const SeriesFit& fit, std::span<const MeasuredChannel> measured,
-                              const SeriesFitSettings& settings) {
+inline Posterior weigh_series(const SeriesFit& fit, std::span<const MeasuredChannel> measured, double none_prior) {
   const std::vector<SeriesMisfit> misfits = series_misfits(fit.noise);
   const auto evidence = [&](std::size_t channel) { return misfits[channel].evidence(readings_in(measured[channel])); };
   const EvidenceSettings first = evidence(0);
-  Posterior posterior({first.independent_errors, first.least_squared, first.hopeless_share, settings.none_prior});
+  Posterior posterior({first.independent_errors, first.least_squared, first.hopeless_share, none_prior});
   for (std::size_t channel = 1; channel < measured.size(); ++channel) {
     posterior.add_source(evidence(channel));
   }
   for (std::size_t hypothesis = 0; hypothesis < fit.predicted.size(); ++hypothesis) {
-    posterior.add(settings.log_prior.empty() ? 0.0 : settings.log_prior[hypothesis]);
+    posterior.add(fit.log_prior[hypothesis]);
     for (std::size_t channel = 0; channel < measured.size(); ++channel) {
       const std::vector<double>& predicted = fit.predicted[hypothesis][channel];
       posterior.observe(hypothesis, misfits[channel].misfit(predicted, measured[channel].values), channel);
@@ -107,6 +107,7 @@ SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypoth
   expects(!measured.empty(), "fit_series: number of channels", "at least 1", 0);
   SeriesFit fit;
   fit.hypotheses = std::move(hypotheses);
+  fit.log_prior = settings.log_prior.empty() ? std::vector<double>(fit.hypotheses.size(), 0.0) : settings.log_prior;
   for (std::size_t channel = 0; channel < measured.size(); ++channel) {
     const std::string name = "fit_series: channel " + std::to_string(channel) + ": number of ";
     expects(measured[channel].values.size() == times.size(), name + "values", "that of times",
@@ -143,7 +144,7 @@ SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypoth
     for (ChannelNoise& noise : fit.noise) {
       noise.readings_per_error = asked(noise) ? 1 : noise.readings_per_error;
     }
-    const Posterior first = detail::weigh_series(fit, measured, settings);
+    const Posterior first = detail::weigh_series(fit, measured, settings.none_prior);
     expects(!first.excluded(first.best()), "fit_series: hypotheses that could be predicted", "at least 1", 0);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       if (asked(given[channel])) {
@@ -155,7 +156,7 @@ SeriesFit fit_series(const Model& model, std::vector<std::vector<double>> hypoth
       }
     }
   }
-  fit.posterior = detail::weigh_series(fit, measured, settings);
+  fit.posterior = detail::weigh_series(fit, measured, settings.none_prior);
   return fit;
 }
 

@@ -19,6 +19,9 @@ struct ChannelNoise {
   /// Standard deviation of one reading, > 0, in the channel's unit: the sensor's noise, from its data sheet or from
   /// readings at rest. What the model adds to it need not be known, see SeriesMisfit.
   double deviation = 1;
+  /// Where deviation is instead that of all that right predictions are off by, the model's share included: the number
+  /// of independent readings that it was measured on. 0: deviation is the sensor's alone.
+  double measured_on = 0;
   /// How many successive readings are off together, >= 1. Noise of the sensor alone: 1. What a model or a calibration
   /// is off by lasts: seconds or minutes, times the readings per second. readings_per_error() measures it.
   double readings_per_error = 1;
@@ -38,7 +41,10 @@ struct ChannelNoise {
 ///   log p = -(n / 2) log(1 + D / n)
 /// is that of normal errors with the sensor's deviation where predictions are as good as the sensor, and that of errors
 /// with unknown deviation where they are not: the model's share is integrated out. In between, the variance counts as
-/// the sum of both. Channels in different units, or with other errors, are sources of their own.
+/// the sum of both. A deviation of everything, measured on m readings, is worth m readings:
+///   log p = -((m + n) / 2) log(1 + D / m),
+/// Student's t with m degrees of freedom for a single reading. Channels in different units, or with other errors, are
+/// sources of their own.
 class SeriesMisfit {
  public:
   /// Throws std::invalid_argument if a number is out of range.
@@ -47,6 +53,8 @@ class SeriesMisfit {
             noise.deviation);
     expects(noise.readings_per_error >= 1 && std::isfinite(noise.readings_per_error),
             "SeriesMisfit: readings_per_error", ">= 1 and finite", noise.readings_per_error);
+    expects(noise.measured_on >= 0 && std::isfinite(noise.measured_on), "SeriesMisfit: measured_on", ">= 0 and finite",
+            noise.measured_on);
     expects(std::isfinite(noise.idle), "SeriesMisfit: idle", "finite", noise.idle);
     per_squared_ = 1 / (noise.deviation * noise.deviation * noise.readings_per_error);
   }
@@ -78,7 +86,8 @@ class SeriesMisfit {
   EvidenceSettings evidence(double readings) const {
     expects(readings > 0 && std::isfinite(readings), "SeriesMisfit: number of readings", "> 0 and finite", readings);
     const double errors = std::max(1.0, readings / noise_.readings_per_error);
-    return {errors, errors, 0.1};
+    const double known = noise_.measured_on;
+    return {known + errors, known > 0 ? known : errors, 0.1};
   }
 
   const ChannelNoise& noise() const noexcept { return noise_; }
