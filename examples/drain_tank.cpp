@@ -30,7 +30,7 @@ using decant::detail::fixed_text;
 
 /// A way to take the level at the beginning, and what came of it.
 struct Answer {
-  std::string start;
+  std::string key, start;  ///< for scripts, and for readers
   example::DrainFit fit;
 };
 
@@ -49,7 +49,7 @@ nlohmann::json to_json(const std::vector<Answer>& answers, const example::DrainR
   for (const Answer& answer : answers) {
     const auto& c = answer.fit.coefficient;
     const auto& series = answer.fit.series;
-    json[answer.start] = {
+    json[answer.key] = {
         {"coefficient", c.median},
         {"interval_90", {c.low, c.high}},
         {"at_end", c.at_end},
@@ -134,8 +134,9 @@ int main(int count, char** values) {
     const example::DrainingTank tank = example::tank_fabusola2025();
     const example::DrainRecord record = example::read_drain_record(folder);
     std::vector<Answer> answers;
-    answers.push_back({"as_read", example::fit_discharge(tank, record, 0, threads)});
-    answers.push_back({"as_unsure_as_others", example::fit_discharge(tank, record, record.calibration_error, threads)});
+    answers.push_back({"as_read", "as read", example::fit_discharge(tank, record, 0, threads)});
+    answers.push_back({"as_unsure_as_others", "as unsure as other readings",
+                       example::fit_discharge(tank, record, record.calibration_error, threads)});
     std::fputs(table_of(answers).text().c_str(), stdout);
     if (!json_file.empty()) {
       example::write_result(json_file, to_json(answers, record));

@@ -18,18 +18,18 @@ namespace example {
 
 /// f(x) with a slope that is linear between even knots, so that f is a quadratic spline: the one with the smallest
 ///   sum_i (y_i - f(x_i))^2 + lambda sum_k (slope_(k-1) - 2 slope_k + slope_(k+1))^2.
-/// lambda is the one by which each reading is best predicted from the others (leave-one-out cross-validation; Craven
-/// and Wahba 1979), among those with which f rises everywhere. The smoothest curve that lambda can ask for has an even
-/// change of slope.
+/// lambda is the one by which each reading, but for the outermost, is best predicted from the others (leave-one-out
+/// cross-validation; Craven and Wahba 1979), among those with which f rises everywhere. The smoothest curve that lambda
+/// can ask for has an even change of slope.
 class MonotoneCurve {
  public:
   struct Reading {
     double x, y;
   };
 
-  /// @param readings at least 4, at two x or more, in any order; y has an even deviation. @param through_first makes f
-  /// pass through the first one exactly, and counts it for nothing else. Throws std::invalid_argument, also if no curve
-  /// that rises comes close to the readings.
+  /// @param readings at least 4, in any order, at three x or more; y has an even deviation. @param through_first makes
+  /// f pass through the first one exactly, and counts it for nothing else. Throws std::invalid_argument, also if no
+  /// curve that rises comes close to the readings.
   explicit MonotoneCurve(const std::vector<Reading>& readings, bool through_first = false, int pieces = 24) {
     decant::expects(readings.size() >= 4, "MonotoneCurve: number of readings", ">= 4", readings.size());
     decant::expects(pieces >= 2, "MonotoneCurve: number of pieces", ">= 2", pieces);
@@ -45,6 +45,9 @@ class MonotoneCurve {
     }
     decant::expects(end_ > begin_ && high_y > low_y, "MonotoneCurve: range of readings", "more than one number",
                     high_y - low_y);
+    decant::expects(std::any_of(readings.begin(), readings.end(),
+                                [&](const Reading& reading) { return reading.x > begin_ && reading.x < end_; }),
+                    "MonotoneCurve: number of readings between the outermost", ">= 1", 0);
     piece_ = (end_ - begin_) / pieces;
     choose(readings, through_first, pieces, high_y - low_y);
   }
@@ -73,7 +76,7 @@ class MonotoneCurve {
     return 0.5 * (low + high);
   }
 
-  /// Of what a reading is off by when it is predicted from the others: root mean square.
+  /// Of what a reading between the outermost is off by when it is predicted from the others: root mean square.
   double left_out_error() const { return left_out_error_; }
 
  private:
@@ -122,12 +125,17 @@ class MonotoneCurve {
         continue;
       }
       double squares = 0;
+      int counted = 0;
       for (Eigen::Index i = through_first ? 1 : 0; i < count; ++i) {
-        const double own_share = rows.row(i).dot(solver.solve(Eigen::VectorXd(rows.row(i).transpose())));
-        const double off = (right[i] - rows.row(i).dot(solution)) / std::max(1e-9, 1 - own_share);
-        squares += off * off;
+        const double x = readings[static_cast<std::size_t>(i)].x;
+        if (x > begin_ && x < end_) {
+          const double own_share = rows.row(i).dot(solver.solve(Eigen::VectorXd(rows.row(i).transpose())));
+          const double off = (right[i] - rows.row(i).dot(solution)) / std::max(1e-9, 1 - own_share);
+          squares += off * off;
+          ++counted;
+        }
       }
-      const double error = range * std::sqrt(squares / static_cast<double>(count - (through_first ? 1 : 0)));
+      const double error = range * std::sqrt(squares / counted);
       if (error < left_out_error_) {
         left_out_error_ = error;
         take(range * solution);

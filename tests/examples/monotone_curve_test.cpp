@@ -58,5 +58,6 @@ TEST_CASE("monotone curve: refuses what does not rise, and too little") {
                     Catch::Contains("such that they rise"));
   CHECK_THROWS_WITH(MonotoneCurve({{0, 0}, {1, 1}, {2, 2}}), Catch::Contains("number of readings"));
   CHECK_THROWS_WITH(MonotoneCurve({{0, 0}, {0, 1}, {0, 2}, {0, 3}}), Catch::Contains("range"));
+  CHECK_THROWS_WITH(MonotoneCurve({{0, 0}, {0, 1}, {1, 2}, {1, 3}}), Catch::Contains("between the outermost"));
   CHECK_THROWS_WITH(MonotoneCurve({{0, 0}, {1, std::nan("")}, {2, 2}, {3, 3}}), Catch::Contains("finite"));
 }
