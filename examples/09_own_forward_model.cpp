@@ -44,9 +44,8 @@ int main() {
 
   const SeriesMisfit level({.deviation = 0.003, .readings_per_error = 20, .idle = 0.12});  // [m], errs for 2 s
   const SeriesMisfit mass({.deviation = 0.008});                                           // [kg], noise alone
-  const EvidenceSettings by_level = level.evidence(300);
-  Posterior posterior({by_level.independent_errors, by_level.least_squared, by_level.hopeless_share});
-  const std::size_t scale = posterior.add_source(mass.evidence(300));
+  Posterior posterior;
+  const std::size_t scale = posterior.add_source(mass.evidence(1));
   std::vector<std::vector<std::vector<double>>> predicted;
   std::vector<double> radius;
   for (double r = 0.0025; r < 0.0036; r += 0.00002) {
@@ -62,6 +61,8 @@ int main() {
   for (std::size_t k = 0; k < times.size(); ++k) {
     stuck += k % 20 == 0 ? 0.003 * noise(random) - stuck : 0;
     const double seen = really[0][k] + stuck, weighed = really[1][k] + 0.008 * noise(random);
+    posterior.set_source(0, level.evidence(static_cast<double>(k + 1)));
+    posterior.set_source(scale, mass.evidence(static_cast<double>(k + 1)));
     std::vector<double> log_posterior;
     for (std::size_t n = 0; n < posterior.size(); ++n) {
       posterior.observe(n, level.misfit(predicted[n][0][k], seen));

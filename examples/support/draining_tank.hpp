@@ -166,8 +166,7 @@ struct DrainCourse {
 /// @param every how many readings there are from one estimate to the next.
 inline DrainCourse follow_discharge(const DrainFit& fit, const DrainRecord& record, std::size_t every) {
   const decant::SeriesMisfit level(fit.series.noise[0]);
-  const decant::EvidenceSettings worth = level.evidence(static_cast<double>(record.time.size()));
-  decant::Posterior posterior({worth.independent_errors, worth.least_squared, worth.hopeless_share});
+  decant::Posterior posterior;
   std::vector<double> values, log_posterior(fit.series.hypotheses.size());
   for (std::size_t k = 0; k < fit.series.hypotheses.size(); ++k) {
     posterior.add(fit.series.log_prior[k]);
@@ -175,6 +174,7 @@ inline DrainCourse follow_discharge(const DrainFit& fit, const DrainRecord& reco
   }
   DrainCourse course;
   for (std::size_t reading = 0; reading < record.time.size(); ++reading) {
+    posterior.set_source(0, level.evidence(static_cast<double>(reading + 1)));
     for (std::size_t k = 0; k < values.size(); ++k) {
       posterior.observe(k, level.misfit(fit.series.predicted[k][0][reading], record.level[reading]));
       log_posterior[k] = posterior.log_posterior(k);

@@ -165,6 +165,43 @@ TEST_CASE("series fit: two unknowns, of which one does not matter, and two chann
   }
 }
 
+TEST_CASE("series fit: readings that come one by one say what a recording of them says") {
+  const std::vector<double> times = steps(0, 5, 60), values = [] {
+    std::mt19937 random(8);
+    std::normal_distribution<double> normal;
+    std::vector<double> result;
+    for (int k = 0; k < 60; ++k) {
+      result.push_back(k % 7 == 3 ? std::numeric_limits<double>::quiet_NaN() : 4 + 0.3 * normal(random));
+    }
+    return result;
+  }();
+  const ChannelNoise noise{.deviation = 0.1, .readings_per_error = 4};
+  const SeriesMisfit misfit(noise);
+  Posterior posterior;
+  const auto hypotheses = offsets(3, 5, 11);
+  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+    posterior.add();
+  }
+  double readings = 0;
+  for (std::size_t now = 0; now < times.size(); ++now) {
+    readings += std::isfinite(values[now]) ? 1 : 0;
+    posterior.set_source(0, misfit.evidence(readings));
+    for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+      posterior.observe(k, misfit.misfit(hypotheses[k][0], values[now]));
+    }
+    if (now % 20 == 19) {
+      const std::span<const double> so_far(times.data(), now + 1);
+      const std::vector<MeasuredChannel> measured{
+          {{values.begin(), values.begin() + static_cast<long>(now) + 1}, noise}};
+      const SeriesFit fit = fit_series(StraightLine{}, hypotheses, so_far, measured, ThreadExecutor{{1}});
+      for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+        CHECK(posterior.probability(k) == Approx(fit.posterior.probability(k)).margin(1e-12));
+      }
+    }
+  }
+  CHECK_THROWS_AS(posterior.set_source(1, misfit.evidence(1)), std::out_of_range);
+}
+
 TEST_CASE("series fit: none of these, and hypotheses that cannot be predicted") {
   const std::vector<double> times = steps(0, 1, 20);
   std::vector<double> falling;

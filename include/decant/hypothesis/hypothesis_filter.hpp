@@ -50,6 +50,8 @@ class HypothesisFilter {
   /// Adds a source of evidence beside the masks, such as a scale (see series_misfit.hpp); before hypotheses. Throws as
   /// Posterior::add_source does. @return its number, for observe().
   std::size_t add_source(const EvidenceSettings& settings) { return posterior_.add_source(settings); }
+  /// See Posterior::set_source.
+  void set_source(std::size_t source, const EvidenceSettings& settings) { posterior_.set_source(source, settings); }
 
   /// Adds a hypothesis. All trackers have the same cameras and bodies by number, and one time.
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.

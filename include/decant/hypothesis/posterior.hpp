@@ -75,15 +75,21 @@ class Posterior {
   /// std::invalid_argument if a setting is out of range, or if there are hypotheses.
   /// @return its number.
   std::size_t add_source(const EvidenceSettings& settings) {
+    expects(hypotheses_.empty(), "Posterior: hypotheses before a source is added", "none", hypotheses_.size());
+    sources_.emplace_back();
+    set_source(sources_.size() - 1, settings);
+    return sources_.size() - 1;
+  }
+  /// What all misfits of a source are worth from now on, those that are in included: readings that come one by one are
+  /// worth more the more there are (SeriesMisfit::evidence). Throws as add_source does.
+  void set_source(std::size_t source, const EvidenceSettings& settings) {
     expects(settings.independent_errors > 0 && std::isfinite(settings.independent_errors),
             "Posterior: independent_errors", "> 0", settings.independent_errors);
     expects(settings.least_squared > 0 && std::isfinite(settings.least_squared), "Posterior: least_squared", "> 0",
             settings.least_squared);
     expects(settings.hopeless_share > 0 && settings.hopeless_share <= 1, "Posterior: hopeless_share", "in (0, 1]",
             settings.hopeless_share);
-    expects(hypotheses_.empty(), "Posterior: hypotheses before a source is added", "none", hypotheses_.size());
-    sources_.push_back(settings);
-    return sources_.size() - 1;
+    sources_.at(source) = settings;
   }
 
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.

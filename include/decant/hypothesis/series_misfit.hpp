@@ -30,9 +30,10 @@ struct ChannelNoise {
 };
 
 /// Misfits of one channel's readings, for a source of evidence of its own in a Posterior or a HypothesisFilter:
-///   const SeriesMisfit scale({.deviation = 0.002, .readings_per_error = 10});                 // [kg]
-///   const std::size_t source = filter.add_source(scale.evidence(300));                        // readings in all
-///   filter.observe(k, scale.misfit(predicted, measured), source);                             // of each hypothesis k
+///   const SeriesMisfit scale({.deviation = 0.002, .readings_per_error = 10});  // [kg]
+///   const std::size_t source = filter.add_source(scale.evidence(1));
+///   filter.observe(k, scale.misfit(predicted, measured), source);              // the n-th reading, of each hypothesis
+///   filter.set_source(source, scale.evidence(n));
 ///
 /// Their unit is the squared deviation of one independent error: a right prediction comes to about one for every
 /// readings_per_error readings, whatever their rate. That is what differs from masks, whose unit is a cell and whose
@@ -80,9 +81,9 @@ class SeriesMisfit {
     return sum;
   }
 
-  /// What these misfits are worth, once so many readings are in (more add nothing: the share of a model's errors that
-  /// lasts for good does not average out). "None of these" is off by a third of what happened, a tenth of its square:
-  /// numbers, unlike masks, are hardly ever off by more.
+  /// What these misfits are worth when so many readings are in. Where part of what a model is off by lasts for good,
+  /// which does not average out, stay at the number of readings in the time that it is trusted for. "None of these" is
+  /// off by a third of what happened, a tenth of its square: numbers, unlike masks, are hardly ever off by more.
   EvidenceSettings evidence(double readings) const {
     expects(readings > 0 && std::isfinite(readings), "SeriesMisfit: number of readings", "> 0 and finite", readings);
     const double errors = std::max(1.0, readings / noise_.readings_per_error);
