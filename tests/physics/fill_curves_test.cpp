@@ -45,7 +45,7 @@ struct FittedContainer {
         left_out(readings.every_other(1 - first)) {}
 };
 
-std::optional<FillReadings> bottle(int number) {
+std::optional<FillReadings> readings_of(int number) {
   const auto file = decant_test::measurements("bottle_level_mass/bottle" + std::to_string(number) + ".csv");
   return file ? std::optional(example::read_fill_readings(*file)) : std::nullopt;
 }
@@ -109,7 +109,7 @@ TEST_CASE(
   double squares = 0, worst = 0, share_squares = 0;
   int count = 0, within_2_mm = 0;
   for (int number = 1; number <= 6; ++number) {
-    const auto readings = bottle(number);
+    const auto readings = readings_of(number);
     if (!readings) {
       return;
     }
@@ -144,7 +144,7 @@ TEST_CASE("fill curves: the mass in six measured containers from one level, with
   int count = 0, held = 0;
   std::vector<double> errors;
   for (int number = 1; number <= 6; ++number) {
-    const auto readings = bottle(number);
+    const auto readings = readings_of(number);
     if (!readings) {
       return;
     }
@@ -171,7 +171,7 @@ TEST_CASE("fill curves: the mass in six measured containers from one level, with
 TEST_CASE("fill curves: particles settle at the measured level", "[slow]") {
   const double spacing = 0.005;
   for (int number = 1; number <= 6; ++number) {
-    const auto readings = bottle(number);
+    const auto readings = readings_of(number);
     if (!readings) {
       return;
     }
@@ -195,7 +195,7 @@ TEST_CASE("fill curves: particles settle at the measured level", "[slow]") {
 }
 
 TEST_CASE("fill curves: the mass from a level by simulated fillings", "[slow]") {
-  const auto readings = bottle(5);
+  const auto readings = readings_of(5);
   if (!readings) {
     return;
   }
