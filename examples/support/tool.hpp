@@ -12,7 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "result_file.hpp"
+#include "json_result.hpp"
 
 namespace example {
 

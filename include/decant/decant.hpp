@@ -82,7 +82,11 @@
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/hypothesis/hypothesis_groups.hpp>
 #include <decant/hypothesis/independent_groups.hpp>
+#include <decant/hypothesis/marginal.hpp>
 #include <decant/hypothesis/posterior.hpp>
+#include <decant/hypothesis/series_fit.hpp>
+#include <decant/hypothesis/series_misfit.hpp>
+#include <decant/hypothesis/series_model.hpp>
 #include <decant/hypothesis/thread_executor.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>

@@ -9,6 +9,7 @@
 #include <decant/correction/open_loop.hpp>
 #include <decant/correction/transport_corrector.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
+#include <decant/hypothesis/series_misfit.hpp>
 
 #include "catch.hpp"
 #include "tracking/falling_dust.hpp"
@@ -100,6 +101,41 @@ TEST_CASE("hypothesis filter: a corrector that makes every hypothesis fit does n
   }
   CHECK(corrected.posterior().misfit(4).squared == Approx(before));
   CHECK(after_it < 0.5 * before);
+}
+
+TEST_CASE("hypothesis filter: what a scale or a probe reads counts beside the masks, or without any") {
+  // a probe reads how high the dust is on average
+  const auto height = [](const FallingDust& model) { return model.dust.position.row(2).mean(); };
+  HypothesisFilterSettings settings;
+  settings.posterior.none_prior = 0;
+  HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
+  const SeriesMisfit probe({.deviation = 0.002, .idle = height(falling_with<OpenLoop<double>>(0).model())});
+  const std::size_t source = filter.add_source(probe.evidence(9));
+  for (int gravity = 0; gravity <= 4; ++gravity) {
+    filter.add(falling_with<OpenLoop<double>>(-gravity));
+  }
+  FallingDust reality = falling_with<OpenLoop<double>>(-2).model();
+  std::vector<double> squared(5, 0.0);
+  for (int frame = 1; frame <= 9; ++frame) {
+    reality.step(1 / 30.0);
+    REQUIRE(filter.track({frame / 30.0, {}, {}}).status == FrameStatus::Uncorrected);  // no mask at all
+    for (std::size_t k = 0; k < filter.size(); ++k) {
+      if (!filter.given_up(k)) {
+        const double off = height(filter.tracker(k).model()) - height(reality);
+        squared[k] += off * off / (0.002 * 0.002);
+        filter.observe(k, probe.misfit(height(filter.tracker(k).model()), height(reality)), source);
+      }
+    }
+  }
+  CHECK(filter.best() == 2);
+  CHECK(filter.probability(2) > 0.9);
+  CHECK(filter.given_up(4));
+  for (const std::size_t k : {1, 3}) {
+    CHECK(filter.posterior().misfit(k, source).squared == Approx(squared[k]));
+  }
+  const double until_then = filter.posterior().misfit(4, source).squared;
+  filter.observe(4, {1e9, 0}, source);  // nothing is left to learn about one that was given up
+  CHECK(filter.posterior().misfit(4, source).squared == until_then);
 }
 
 TEST_CASE("hypothesis filter: before anything is seen there is the prior, and frames that are refused say nothing") {

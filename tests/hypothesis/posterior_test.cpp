@@ -186,6 +186,43 @@ TEST_CASE("posterior: what is not a number excludes a hypothesis, and nothing el
   CHECK(posterior.probability_of_none() == Approx(1));
 }
 
+TEST_CASE("posterior: what several sources say is multiplied") {
+  const EvidenceSettings scale{6, 6, 0.1};
+  Posterior both;
+  const std::size_t source = both.add_source(scale);
+  CHECK(source == 1);
+  CHECK(both.sources() == 2);
+  Posterior masks, alone({scale.independent_errors, scale.least_squared, scale.hopeless_share});
+  const std::vector<Misfit> seen_by_masks{{100, 1000}, {140, 1000}}, weighed{{3, 900}, {50, 900}};
+  for (std::size_t k = 0; k < 2; ++k) {
+    both.observe(both.add(), seen_by_masks[k]);
+    both.observe(k, weighed[k], source);
+    masks.observe(masks.add(), seen_by_masks[k]);
+    alone.observe(alone.add(), weighed[k]);
+    CHECK(both.misfit(k).squared == seen_by_masks[k].squared);
+    CHECK(both.misfit(k, source).squared == weighed[k].squared);
+  }
+  // odds of hypotheses, and of none of these, are products of those of the sources over the prior's
+  const auto odds = [](const Posterior& posterior, std::size_t k) {
+    return posterior.probability(k) / posterior.probability(0);
+  };
+  CHECK(odds(both, 1) == Approx(odds(masks, 1) * odds(alone, 1)));
+  const double none_before = PosteriorSettings{}.none_prior / (0.5 * (1 - PosteriorSettings{}.none_prior));
+  const auto none_odds = [](const Posterior& posterior) {
+    return posterior.probability_of_none() / posterior.probability(0);
+  };
+  CHECK(none_odds(both) == Approx(none_odds(masks) * none_odds(alone) / none_before));
+  CHECK(sum_of(both) == Approx(1));
+
+  // a source by which all are equally far off takes nothing from what another says
+  both.observe(0, {1e9, 0}, source);
+  both.observe(1, {1e9, 0}, source);
+  CHECK(odds(both, 1) == Approx(odds(masks, 1)));
+  both.observe(1, {std::nan(""), 0}, source);
+  CHECK(both.excluded(1));
+  CHECK_THROWS_WITH(both.add_source(scale), Catch::Contains("before a source is added"));
+}
+
 TEST_CASE("posterior: settings out of range are refused") {
   const auto with = [](auto set) {
     PosteriorSettings settings;

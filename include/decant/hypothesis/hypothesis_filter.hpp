@@ -128,6 +128,12 @@ class HypothesisFilter {
             "in [0, 1)", settings.least_probability);
   }
 
+  /// Adds a source of evidence beside the masks, such as a scale (see series_misfit.hpp); before hypotheses. Throws as
+  /// Posterior::add_source does. @return its number, for observe().
+  std::size_t add_source(const EvidenceSettings& settings) { return posterior_.add_source(settings); }
+  /// See Posterior::set_source.
+  void set_source(std::size_t source, const EvidenceSettings& settings) { posterior_.set_source(source, settings); }
+
   /// Adds a hypothesis. All trackers have the same cameras and bodies by number, and one time.
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
   /// @param region by camera, the part of its picture that this hypothesis is about: elsewhere its tracker sees no
@@ -182,6 +188,14 @@ class HypothesisFilter {
     }
     give_up();
     return hypotheses_[given_up(before) && !hypotheses_[before].last.report.advanced() ? best() : before].last.report;
+  }
+
+  /// Adds what another source says of a hypothesis, whose tracker's model has what it predicts; for one that was given
+  /// up nothing. It counts from the next frame on when hypotheses are given up.
+  void observe(std::size_t hypothesis, const Misfit& misfit, std::size_t source) noexcept {
+    if (hypotheses_[hypothesis].tracker) {
+      posterior_.observe(hypothesis, misfit, source);
+    }
   }
 
   std::size_t size() const noexcept { return hypotheses_.size(); }

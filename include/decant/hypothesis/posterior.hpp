@@ -28,6 +28,14 @@ struct Misfit {
   }
 };
 
+/// What the misfits of one source of evidence are worth: of the masks of all cameras, of the readings of a scale.
+struct EvidenceSettings {
+  double independent_errors = 20;  ///< see PosteriorSettings, > 0
+  double least_squared = 5;        ///< see PosteriorSettings, > 0
+  double hopeless_share = 0.6;     ///< see PosteriorSettings, in (0, 1]
+};
+
+/// The defaults are for masks, whose misfits are counted in cells (HypothesisFilter).
 struct PosteriorSettings {
   /// How many independent errors a model makes in all, > 0. Differences in neighbouring cells and successive frames
   /// come from the same few errors (a pose, a delay, friction), so this is far below the number of cells, and does not
@@ -48,52 +56,84 @@ struct PosteriorSettings {
 /// which makes ratios of D count and not their sizes (Student's t; Gelman et al., Bayesian Data Analysis, 2013, section
 /// 3.2), and cannot underflow however many frames there are. Where even the best prediction is far off, differences
 /// between them say little.
+///
+/// Evidence may come from several sources, each with a unit and errors of its own: masks, a scale, a level probe. What
+/// they say is multiplied, so that a source by which all predictions are far off says little, and takes nothing from
+/// what the others say.
 class Posterior {
  public:
   using Settings = PosteriorSettings;
 
   /// Throws std::invalid_argument if a setting is out of range.
   explicit Posterior(const Settings& settings = {}) : settings_(settings) {
+    expects(settings.none_prior >= 0 && settings.none_prior < 1, "Posterior: none_prior", "in [0, 1)",
+            settings.none_prior);
+    add_source({settings.independent_errors, settings.least_squared, settings.hopeless_share});
+  }
+
+  /// Adds a source of evidence to the one, 0, that the settings are about; before hypotheses. Throws
+  /// std::invalid_argument if a setting is out of range, or if there are hypotheses.
+  /// @return its number.
+  std::size_t add_source(const EvidenceSettings& settings) {
+    expects(hypotheses_.empty(), "Posterior: hypotheses before a source is added", "none", hypotheses_.size());
+    sources_.emplace_back();
+    set_source(sources_.size() - 1, settings);
+    return sources_.size() - 1;
+  }
+  /// What all misfits of a source are worth from now on, those that are in included: readings that come one by one are
+  /// worth more the more there are (SeriesMisfit::evidence). Throws as add_source does.
+  void set_source(std::size_t source, const EvidenceSettings& settings) {
     expects(settings.independent_errors > 0 && std::isfinite(settings.independent_errors),
             "Posterior: independent_errors", "> 0", settings.independent_errors);
     expects(settings.least_squared > 0 && std::isfinite(settings.least_squared), "Posterior: least_squared", "> 0",
             settings.least_squared);
     expects(settings.hopeless_share > 0 && settings.hopeless_share <= 1, "Posterior: hopeless_share", "in (0, 1]",
             settings.hopeless_share);
-    expects(settings.none_prior >= 0 && settings.none_prior < 1, "Posterior: none_prior", "in [0, 1)",
-            settings.none_prior);
+    sources_.at(source) = settings;
   }
 
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
   /// @return its number, counting from 0.
   std::size_t add(double log_prior = 0) {
     expects(std::isfinite(log_prior), "Posterior: log_prior", "finite", log_prior);
-    hypotheses_.push_back({log_prior, {}, false});
+    hypotheses_.push_back({log_prior, std::vector<Misfit>(sources_.size()), false});
     return hypotheses_.size() - 1;
   }
 
-  /// Adds what one more frame says. What is not finite excludes the hypothesis.
-  void observe(std::size_t hypothesis, const Misfit& misfit) noexcept {
+  /// Adds what one more frame or reading says. What is not finite excludes the hypothesis.
+  void observe(std::size_t hypothesis, const Misfit& misfit, std::size_t source = 0) noexcept {
     Hypothesis& one = hypotheses_[hypothesis];
-    one.misfit += misfit;
-    one.excluded = one.excluded || !std::isfinite(one.misfit.squared) || !std::isfinite(one.misfit.measured);
+    Misfit& sum = one.misfits[source];
+    sum += misfit;
+    one.excluded = one.excluded || !std::isfinite(sum.squared) || !std::isfinite(sum.measured);
   }
   /// Gives a hypothesis no probability from now on.
   void exclude(std::size_t hypothesis) noexcept { hypotheses_[hypothesis].excluded = true; }
 
   std::size_t size() const noexcept { return hypotheses_.size(); }
+  std::size_t sources() const noexcept { return sources_.size(); }
   bool excluded(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).excluded; }
-  const Misfit& misfit(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).misfit; }
+  const Misfit& misfit(std::size_t hypothesis, std::size_t source = 0) const {
+    return hypotheses_.at(hypothesis).misfits.at(source);
+  }
 
-  /// Log likelihood of a sum of squared differences [nat], 0 for none.
-  double log_likelihood(double squared) const noexcept {
-    return -0.5 * settings_.independent_errors * std::log1p(squared / settings_.least_squared);
+  /// Log likelihood of a source's sum of squared differences [nat], 0 for none.
+  double log_likelihood(double squared, std::size_t source = 0) const noexcept {
+    const EvidenceSettings& of = sources_[source];
+    return -0.5 * of.independent_errors * std::log1p(squared / of.least_squared);
   }
 
   /// Prior and likelihood [nat], up to a constant that all share; -infinity for one that is excluded.
   double log_posterior(std::size_t hypothesis) const {
     const Hypothesis& one = hypotheses_.at(hypothesis);
-    return one.excluded ? -std::numeric_limits<double>::infinity() : one.log_prior + log_likelihood(one.misfit.squared);
+    if (one.excluded) {
+      return -std::numeric_limits<double>::infinity();
+    }
+    double sum = one.log_prior;
+    for (std::size_t source = 0; source < sources_.size(); ++source) {
+      sum += log_likelihood(one.misfits[source].squared, source);
+    }
+    return sum;
   }
   /// The same for "none of these", which is taken to be off by hopeless_share of the liquid in play: of what was
   /// measured or, where hypotheses are off by more than all of that, of what they are off by on average (an empty
@@ -102,8 +142,11 @@ class Posterior {
     if (settings_.none_prior == 0) {
       return -std::numeric_limits<double>::infinity();
     }
-    const double odds = settings_.none_prior / (1 - settings_.none_prior);
-    return std::log(odds) + total_log_prior() + log_likelihood(settings_.hopeless_share * in_play());
+    double sum = std::log(settings_.none_prior / (1 - settings_.none_prior)) + total_log_prior();
+    for (std::size_t source = 0; source < sources_.size(); ++source) {
+      sum += log_likelihood(sources_[source].hopeless_share * in_play(source), source);
+    }
+    return sum;
   }
 
   double probability(std::size_t hypothesis) const {
@@ -132,20 +175,22 @@ class Posterior {
  private:
   struct Hypothesis {
     double log_prior;
-    Misfit misfit;
+    std::vector<Misfit> misfits;  ///< by source
     bool excluded;
   };
 
   // One that was excluded has what it had until then, so that giving up hypotheses does not help "none of these".
-  double in_play() const noexcept {
+  double in_play(std::size_t source) const noexcept {
     double measured = 0, total = 0;
     std::size_t count = 0;
     for (const Hypothesis& one : hypotheses_) {
-      measured = std::max(measured, std::isfinite(one.misfit.measured) ? one.misfit.measured : 0.0);
+      const Misfit& misfit = one.misfits[source];
+      measured = std::max(measured, std::isfinite(misfit.measured) ? misfit.measured : 0.0);
     }
     for (const Hypothesis& one : hypotheses_) {
-      if (std::isfinite(one.misfit.squared)) {
-        total += std::max(measured, one.misfit.squared);
+      const Misfit& misfit = one.misfits[source];
+      if (std::isfinite(misfit.squared)) {
+        total += std::max(measured, misfit.squared);
         ++count;
       }
     }
@@ -172,6 +217,7 @@ class Posterior {
   }
 
   Settings settings_;
+  std::vector<EvidenceSettings> sources_{};
   std::vector<Hypothesis> hypotheses_{};
 };
 
