@@ -67,9 +67,9 @@ struct HiddenPhysics {
   }
 };
 
-template <class PressureSolverType, class KernelType = decant::WendlandC2<float>>
+template <class PressureSolverType>
 struct RealityParts : decant::DefaultParts<float> {
-  using Kernel = KernelType;
+  using Kernel = decant::WendlandC2<float>;
   using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
                             decant::LinearDrag<float>>;
   using PressureSolver = PressureSolverType;
