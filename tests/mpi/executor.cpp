@@ -3,6 +3,7 @@
 // only so with several processes. Ends with status 0 if all of it holds in all of them.
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <optional>
 #include <stdexcept>
@@ -125,6 +126,34 @@ void lowest_job_is_thrown() {
   require(text == (executor.process() == 0 ? "thrown by 0" : "job 0 in process 0: thrown by 0"), "got: " + text);
 }
 
+/// The same for jobs of one process that run side by side. @param first whether it is also the first in time.
+void lowest_job_of_a_process_is_thrown(bool first) {
+  if (decant::Threads{2}.resolved() == 1) {
+    return;  // without OpenMP
+  }
+  MpiExecutor executor({2});
+  const std::size_t step = executor.processes();
+  std::atomic<int> begun{0};
+  const auto throw_both = [&] {
+    static_cast<void>(executor.run(
+        2 * step,
+        [&](std::size_t k) -> JobResult {
+          if (k % step != 0) {
+            return {};
+          }
+          ++begun;
+          for (int wait = 0; begun < 2 && wait < 5000; ++wait) {
+            sleep_ms(1);
+          }
+          sleep_ms((k == 0) == first ? 0 : 50);
+          throw std::out_of_range("thrown by " + std::to_string(k));
+        },
+        decant::tell_nobody));
+  };
+  const std::string text = decant_test::thrown_by(throw_both);
+  require(text == (executor.process() == 0 ? "thrown by 0" : "job 0 in process 0: thrown by 0"), "got: " + text);
+}
+
 void what_is_no_exception() {
   MpiExecutor executor;
   const std::size_t last = executor.processes() - 1;
@@ -194,6 +223,8 @@ int main(int argc, char** argv) {
   told_in_time();
   long_results_are_not_waited_for();
   lowest_job_is_thrown();
+  lowest_job_of_a_process_is_thrown(true);
+  lowest_job_of_a_process_is_thrown(false);
   what_is_no_exception();
   different_counts();
   part_of_the_world();

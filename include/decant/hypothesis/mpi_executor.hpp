@@ -222,13 +222,16 @@ class MpiRun {
   }
 
   void hear_news() {
-    for (;;) {
+    // some MPIs answer first and then look for what has arrived meanwhile: what a probe misses, the next one finds
+    for (int misses = 0; misses < 3;) {
       int arrived = 0;
       MPI_Status status;
       MPI_Iprobe(MPI_ANY_SOURCE, news_tag, communicator_.handle(), &arrived, &status);
       if (arrived == 0) {
-        return;
+        ++misses;
+        continue;
       }
+      misses = 0;
       News news{};
       MPI_Recv(&news, news_bytes, MPI_BYTE, status.MPI_SOURCE, news_tag, communicator_.handle(), MPI_STATUS_IGNORE);
       if (news.kind == Kind::End) {
