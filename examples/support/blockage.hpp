@@ -34,9 +34,9 @@ struct BlockageOptions {
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
   TrackingOptions tracking{};
-  /// Hypotheses below this share of the best one's are given up. As far as probabilities are right, what is so is among
-  /// these with at most this times their number: less than a hundredth.
-  double least_probability = 1e-3;
+  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames together
+  /// favoured was once given up at the beginning of the outflow.
+  double least_probability = 1e-4;
   decant::PosteriorSettings posterior{};
 };
 

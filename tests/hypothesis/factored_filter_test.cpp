@@ -181,6 +181,10 @@ void same_as_full_product() {
   REQUIRE(factored.groups().size() == 2);
   CHECK(factored.simulations().size() == accelerations + heights);
   REQUIRE(factored.combinations() == accelerations * heights);
+  // each has its own group's liquid alone
+  CHECK(factored.tracker(0).model().dust.size() == 64 * 6);
+  CHECK(factored.tracker(accelerations).model().dust.size() == 64 * 4);
+  CHECK(factored.tracker(accelerations + 1).model().dust.size() == 64 * 8);
 
   const std::vector<std::vector<double>> log_prior{{0, 0.3, -0.2}, {0.1, 0}};
   HypothesisFilter<DustPourTracker<Scalar>> full(for_dust());

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <decant/boundary/concept.hpp>
+#include <decant/camera/concept.hpp>
 #include <decant/camera/posed_camera.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/pixel_box.hpp>
