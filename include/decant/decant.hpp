@@ -77,10 +77,16 @@
 #include <decant/force/viscosity.hpp>
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
+#include <decant/hypothesis/best_first_search.hpp>
+#include <decant/hypothesis/evaluation.hpp>
 #include <decant/hypothesis/executor.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
 #include <decant/hypothesis/independent_groups.hpp>
+#include <decant/hypothesis/parameter_axis.hpp>
+#include <decant/hypothesis/parameter_estimate.hpp>
 #include <decant/hypothesis/posterior.hpp>
+#include <decant/hypothesis/surrogate.hpp>
+#include <decant/hypothesis/surrogate_search.hpp>
 #include <decant/hypothesis/thread_executor.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
