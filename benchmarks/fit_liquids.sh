@@ -68,7 +68,7 @@ for nu in "${wanted[@]}"; do
   record_one "$nu" 70 $((seed + 6))
   json=$folder/fit_${nu}_${spacing}mm.json
   if [[ ! -s $json ]]; then
-    "$fit" --learn "${learn[@]}" --held-out "$recording" --method both --most-evaluations 30 --spacing-mm "$spacing" \
+    "$fit" --learn "${learn[@]}" --held-out "$recording" --method both --most-evaluations 16 --spacing-mm "$spacing" \
       --threads "${OMP_NUM_THREADS:-0}" --json "$json.part" >"$folder/fit_${nu}_${spacing}mm.log"
     mv "$json.part" "$json"
   fi
