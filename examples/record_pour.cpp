@@ -18,6 +18,7 @@ int main(int count, char** values) {
   example::PourTwin twin;
   std::string out;
   double spacing_mm = 1e3 * twin.spacing;
+  double viscosity = 0, surface_tension = 0;
   bool plain = false, clean = false;
   CLI::App app("Records a pour from a cup or bottle over a pan, as a robot's camera would see it.");
   app.add_option("--out", out, "new folder for the recording")->required();
@@ -27,7 +28,15 @@ int main(int count, char** values) {
   app.add_option("--seed", twin.seed, "decides on motion, noise and hidden physics");
   app.add_option("--spacing-mm", spacing_mm, "of the reality's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--seconds", twin.duration, "length of the recording")->check(CLI::Range(0.1, 60.0));
-  app.add_flag("--nothing-hidden", plain, "the reality has the model's own physics");
+  auto* nothing = app.add_flag("--nothing-hidden", plain, "the reality has the model's own physics");
+  auto* thickness =
+      app.add_option("--viscosity", viscosity, "kinematic viscosity [m^2/s]; nothing else is hidden, but the tension")
+          ->check(CLI::Range(0.0, 1e-2))
+          ->excludes(nothing);
+  auto* tension = app.add_option("--surface-tension", surface_tension,
+                                 "[N/m]; nothing else is hidden, but the viscosity; the reality is position-based")
+                      ->check(CLI::Range(0.0, 1.0))
+                      ->excludes(nothing);
   app.add_flag("--clean", clean, "masks and poses without noise");
   try {
     app.parse(count, values);
@@ -37,6 +46,11 @@ int main(int count, char** values) {
   twin.spacing = 1e-3 * spacing_mm;
   twin.hidden_physics = !plain;
   twin.noisy_masks = twin.noisy_poses = !clean;
+  if (!thickness->empty() || !tension->empty()) {
+    example::HiddenPhysics& chosen = twin.chosen_physics.emplace();
+    chosen.kinematic_viscosity = thickness->empty() ? chosen.kinematic_viscosity : viscosity;
+    chosen.surface_tension = surface_tension;
+  }
   try {
     decant::Progress progress("recording", 1);
     example::record_pour(twin, out, [&](double share) { progress.update(share); });

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -40,6 +41,8 @@ struct PourTwin {
   double fill_fraction = 0.6;     ///< 0 .. 1
   std::uint32_t seed = 1;
   bool hidden_physics = true;  ///< false: the reality is the model itself, at another spacing
+  /// What is hidden, where hidden_physics is true; without it the seed draws two effects.
+  std::optional<HiddenPhysics> chosen_physics{};
   bool noisy_poses = true;
   bool noisy_masks = true;
   double spacing = 0.003;  ///< of the reality's particles [m]: 2.4 times as many as the tracking model's
@@ -52,6 +55,9 @@ inline HiddenPhysics draw_hidden_physics(const PourTwin& twin) {
   HiddenPhysics hidden;
   if (!twin.hidden_physics) {
     return hidden;
+  }
+  if (twin.chosen_physics) {
+    return *twin.chosen_physics;
   }
   std::mt19937 random(7919 * twin.seed + 13);
   const auto between = [&](double low, double high) {
@@ -187,6 +193,9 @@ void record_pour(const PourTwin& twin, const HiddenPhysics& hidden, const std::s
   settings.threads = {twin.threads};
   settings.gravity += hidden.pull;
   settings.liquid.dynamic_viscosity = hidden.kinematic_viscosity * settings.liquid.density;
+  if (hidden.surface_tension > 0) {
+    settings.liquid.surface_tension = hidden.surface_tension;
+  }
   Simulator<Parts> reality(settings);
   const Slip slip = hidden.sticky_walls ? Slip::None : Slip::Free;
   const BodyId cup = reality.add_body(twin.container, container.mesh, PoseTrack(motion.at(0)), slip);
@@ -266,6 +275,8 @@ inline void record_pour(
   const bool position_based = twin.seed % 2 == 1 && twin.container == "cup";
   if (!twin.hidden_physics) {
     detail::record_pour<DefaultParts<>>(twin, hidden, "divergence-free", folder, progress);
+  } else if (hidden.surface_tension > 0) {
+    detail::record_pour<CapillaryRealityParts<PositionBased<float>>>(twin, hidden, "position-based", folder, progress);
   } else if (position_based) {
     detail::record_pour<RealityParts<PositionBased<float>>>(twin, hidden, "position-based", folder, progress);
   } else {

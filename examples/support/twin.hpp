@@ -39,6 +39,7 @@ struct HiddenPhysics {
   double drag = 0;                        ///< slows all motion [1/s]: a model of what breaks up a jet
   bool sticky_walls = false;              ///< liquid does not slip along the container
   double kinematic_viscosity = 1e-6;      ///< [m^2/s]
+  double surface_tension = 0;             ///< [N/m]
   double latency = 0;                     ///< poses were recorded so late [s]
 
   std::string words() const {
@@ -52,18 +53,24 @@ struct HiddenPhysics {
       say("sticky walls");
     if (kinematic_viscosity > 1e-6)
       say("thick liquid");
+    if (surface_tension > 0)
+      say("surface tension");
     if (latency > 0)
       say("late poses");
     return text.empty() ? "nothing" : text;
   }
 
   nlohmann::json json() const {
-    return {{"hidden", words()},
-            {"pull_m_s2", {pull.x(), pull.y(), pull.z()}},
-            {"drag_1_s", drag},
-            {"sticky_walls", sticky_walls},
-            {"kinematic_viscosity_m2_s", kinematic_viscosity},
-            {"latency_s", latency}};
+    nlohmann::json json = {{"hidden", words()},
+                           {"pull_m_s2", {pull.x(), pull.y(), pull.z()}},
+                           {"drag_1_s", drag},
+                           {"sticky_walls", sticky_walls},
+                           {"kinematic_viscosity_m2_s", kinematic_viscosity},
+                           {"latency_s", latency}};
+    if (surface_tension > 0) {
+      json["surface_tension_n_m"] = surface_tension;
+    }
+    return json;
   }
 };
 
@@ -73,6 +80,13 @@ struct RealityParts : decant::DefaultParts<float> {
   using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
                             decant::LinearDrag<float>>;
   using PressureSolver = PressureSolverType;
+};
+
+/// The same with surface tension.
+template <class PressureSolverType>
+struct CapillaryRealityParts : RealityParts<PressureSolverType> {
+  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
+                            decant::LinearDrag<float>, decant::SurfaceTension<float>>;
 };
 
 /// What a segmentation network makes of a silhouette: shifted by a pixel at most, frayed along its edge, with specks.
