@@ -34,8 +34,8 @@ struct BlockageOptions {
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
   TrackingOptions tracking{};
-  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames together
-  /// favoured was once given up at the beginning of the outflow.
+  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames
+  /// together favoured was once given up at the beginning of the outflow.
   double least_probability = 1e-4;
   decant::PosteriorSettings posterior{};
 };
@@ -187,11 +187,12 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
     for (const double opening : openings) {
       // configurations are as probable as each other, whatever the number of openings that one stands for
       const double log_prior = opening > 0 ? -std::log(static_cast<double>(options.openings.size())) : 0;
-      // One body with the junction: walls of several bodies add up, and where one is behind the other's that makes a
-      // hole far narrower than it is.
+      // As long as the leg is wide: a jet from a hole in a thin plate is narrower than the hole, so that as much passes
+      // as through a longer one of two thirds its area.
+      const PipeSection& section = result.legs[leg].section;
       Recording blocked = recording;
       blocked.bodies[body].mesh =
-          joined(recording.bodies[body].mesh, pipe_blockage(result.legs[leg].section, opening, 2 * tracking.spacing));
+          joined(recording.bodies[body].mesh, pipe_blockage(section, opening, 2 * section.radius()));
       models.push_back({result.legs[leg].name + "_" + std::to_string(std::lround(100 * opening)),
                         model_of<TrackingParts>(blocked, tracking), log_prior});
       result.leg.emplace_back(leg);
