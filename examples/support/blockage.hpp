@@ -34,8 +34,8 @@ struct BlockageOptions {
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
   TrackingOptions tracking{};
-  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames together
-  /// favoured was once given up at the beginning of the outflow.
+  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames
+  /// together favoured was once given up at the beginning of the outflow.
   double least_probability = 1e-4;
   decant::PosteriorSettings posterior{};
 };
