@@ -69,7 +69,7 @@ for nu in "${wanted[@]}"; do
   json=$folder/fit_${nu}_${spacing}mm.json
   if [[ ! -s $json ]]; then
     "$fit" --learn "${learn[@]}" --held-out "$recording" --method both --most-evaluations 16 --spacing-mm "$spacing" \
-      --threads "${OMP_NUM_THREADS:-0}" --json "$json.part" >"$folder/fit_${nu}_${spacing}mm.log"
+      --threads "${OMP_NUM_THREADS:-0}" --journal "$folder/fit_${spacing}mm.journal" --json "$json.part" >"$folder/fit_${nu}_${spacing}mm.log"
     mv "$json.part" "$json"
   fi
   # keys are in alphabetical order: held_out, learn, method, parameters, searches

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -17,10 +19,12 @@
 
 #include <decant/core/stopwatch.hpp>
 #include <decant/io/detail/text.hpp>
+#include <decant/io/journal.hpp>
 #include <decant/io/progress.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/table.hpp>
+#include <decant/version.hpp>
 
 #include "support/liquid_fit.hpp"
 #include "support/result_file.hpp"
@@ -101,8 +105,16 @@ void write_report(const std::string& file, const example::LiquidFit& fit) {
   report.write(file);
 }
 
-/// Throws std::runtime_error for a recording that is held out of what it is learnt from.
+/// Throws std::runtime_error for a recording that is given twice, or held out of what it is learnt from.
 void expect_apart(const std::vector<std::string>& learn, const std::vector<std::string>& held_out) {
+  for (const auto& [option, folders] : {std::pair("--learn", &learn), std::pair("--held-out", &held_out)}) {
+    std::set<std::filesystem::path> different;
+    for (const std::string& folder : *folders) {
+      if (!different.insert(std::filesystem::weakly_canonical(folder)).second) {
+        throw std::runtime_error(std::string(option) + ": " + folder + " is given twice");
+      }
+    }
+  }
   for (const std::string& other : held_out) {
     for (const std::string& folder : learn) {
       if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(other)) {
@@ -115,7 +127,7 @@ void expect_apart(const std::vector<std::string>& learn, const std::vector<std::
 }  // namespace
 
 int main(int count, char** values) {
-  std::string json_file, report_file, method = "surrogate";
+  std::string json_file, report_file, journal_file, method = "surrogate";
   std::vector<std::string> learn_folders, held_out_folders;
   example::LiquidFitOptions options;
   example::TrackingOptions tracking;
@@ -134,6 +146,8 @@ int main(int count, char** values) {
   app.add_option("--most-evaluations", options.most_evaluations,
                  "of each search; each runs all recordings to learn from")
       ->check(CLI::Range(9, 10000));
+  app.add_option("--journal", journal_file,
+                 "keeps the result of each run, so that a fit that was stopped goes on where it was");
   app.add_option("--json", json_file, "writes parameters, evaluations and scores");
   app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
@@ -164,11 +178,16 @@ int main(int count, char** values) {
       progress.update(runs, number_text(runs) + " runs, at most " + number_text(at_most));
     };
     decant::ThreadExecutor executor{{threads}};
+    std::optional<decant::Journal> journal;
+    if (!journal_file.empty()) {
+      journal.emplace(journal_file, std::string("fit_liquid of decant ") + DECANT_VERSION);
+    }
+    decant::Journal* kept = journal ? &*journal : nullptr;
     example::LiquidFit fit;
     {
       const decant::Stopwatch watch(milliseconds);
-      example::LiquidRuns learn(read(learn_folders), axes, executor, told);
-      example::LiquidRuns held_out(read(held_out_folders), axes, executor, told);
+      example::LiquidRuns learn(read(learn_folders), axes, executor, kept, told);
+      example::LiquidRuns held_out(read(held_out_folders), axes, executor, kept, told);
       fit = example::fit_liquid(learn, held_out, options);
     }
     progress.finish();

@@ -25,6 +25,7 @@
 #include <decant/hypothesis/surrogate_search.hpp>
 #include <decant/hypothesis/thread_executor.hpp>
 #include <decant/io/detail/text.hpp>
+#include <decant/io/journal.hpp>
 
 #include "liquid_run.hpp"
 #include "result_file.hpp"
@@ -36,10 +37,15 @@ class LiquidRuns {
  public:
   using Point = std::vector<double>;
 
-  /// @param executor must live as long. @param told is told each run as it ends.
+  /// @param executor must live as long, and so must journal, where there is one: it has what ran before.
+  /// @param told is told each run as it ends.
   LiquidRuns(std::vector<LiquidRecording> recordings, std::vector<decant::ParameterAxis> axes,
-             decant::ThreadExecutor& executor, std::function<void()> told)
-      : recordings_(std::move(recordings)), axes_(std::move(axes)), executor_(&executor), told_(std::move(told)) {}
+             decant::ThreadExecutor& executor, decant::Journal* journal, std::function<void()> told)
+      : recordings_(std::move(recordings)),
+        axes_(std::move(axes)),
+        executor_(&executor),
+        journal_(journal),
+        told_(std::move(told)) {}
 
   std::size_t size() const noexcept { return recordings_.size(); }
   const LiquidRecording& recording(std::size_t number) const { return recordings_.at(number); }
@@ -88,10 +94,11 @@ class LiquidRuns {
   }
 
  private:
-  // The one place through which all simulations go: what keeps them in a file (a journal) belongs here, by their keys.
   template <class Work>
   std::vector<decant::JobResult> run(const std::vector<std::string>& keys, const Work& work) {
-    return executor_->run(keys.size(), work, [&](std::size_t, const decant::JobResult&) { told_(); });
+    const auto done = [&](std::size_t, const decant::JobResult&) { told_(); };
+    return journal_ != nullptr ? decant::run_journaled(*executor_, *journal_, keys, work, done)
+                               : executor_->run(keys.size(), work, done);
   }
 
   // What a run depends on, beside the program and what is in the recording's files.
@@ -99,7 +106,7 @@ class LiquidRuns {
     std::string text = recording.recording().folder.string() + " " +
                        decant::detail::number_text(1e3 * recording.options().spacing) + "mm";
     for (std::size_t axis = 0; axis < axes_.size(); ++axis) {
-      text += " " + axes_[axis].name + "=" + decant::detail::number_text(point[axis]);
+      text += " " + axes_[axis].name + "=" + decant::detail::bit_exact_text(point[axis]);
     }
     return text;
   }
@@ -107,6 +114,7 @@ class LiquidRuns {
   std::vector<LiquidRecording> recordings_;
   std::vector<decant::ParameterAxis> axes_;
   decant::ThreadExecutor* executor_;
+  decant::Journal* journal_;
   std::function<void()> told_;
   std::map<Point, decant::JobResult> known_{};
 };

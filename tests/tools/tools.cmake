@@ -289,7 +289,7 @@ elseif(CASE STREQUAL "fit_liquid_is_not_told_the_viscosity")
     file(RENAME "${SCRATCH}/pour" "${SCRATCH}/pour_${seed}")
   endforeach()
   run(0 --learn pour_3 --held-out pour_5 --parameters viscosity --method both --most-evaluations 9 --spacing-mm 9
-      --json out.json --report out.html)
+      --json out.json --report out.html --journal fit.journal)
   expect_keys("${SCRATCH}/out.json" status parameters.viscosity.value parameters.viscosity.interval_90
               parameters.viscosity.told evaluations.best_first evaluations.surrogate learn.before learn.after
               held_out.before held_out.after seconds)
@@ -323,8 +323,24 @@ elseif(CASE STREQUAL "fit_liquid_is_not_told_the_viscosity")
   if(NOT report MATCHES "What is known of viscosity" OR NOT report MATCHES "<svg class=\"chart")
     message(FATAL_ERROR "the report has no chart of the viscosity")
   endif()
+  # again, as after a run that was stopped: what is in the journal is not run again, and the fit is the same
+  file(READ "${SCRATCH}/fit.journal" journal)
+  run(0 --learn pour_3 --held-out pour_5 --parameters viscosity --method both --most-evaluations 9 --spacing-mm 9
+      --json again.json --journal fit.journal)
+  file(READ "${SCRATCH}/fit.journal" journal_again)
+  file(READ "${SCRATCH}/again.json" again)
+  string(JSON json REMOVE "${json}" seconds)
+  string(JSON again REMOVE "${again}" seconds)
+  if(NOT journal STREQUAL journal_again OR NOT json STREQUAL again)
+    message(FATAL_ERROR "a run over its own journal ran again, or came to something else")
+  endif()
 
 elseif(CASE STREQUAL "fit_liquid_refuses")
+  run(2 --learn "${SOURCE}/examples/data/pour_cup" "${SOURCE}/examples/data/pour_cup" --json out.json)
+  expect_one_line("${errors}" "--learn.*given twice")
+  file(WRITE "${SCRATCH}/other.journal" "something else")
+  run(2 --learn "${SOURCE}/examples/data/pour_cup" --journal other.journal)
+  expect_one_line("${errors}" "other.journal")
   set(pour "${SOURCE}/examples/data/pour_cup")
   run(2 --json out.json)
   expect_one_line("${errors}" "--learn")
