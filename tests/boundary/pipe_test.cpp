@@ -98,6 +98,23 @@ TEST_CASE("pipe openings: cups have one; what has no inside has none") {
   CHECK_THROWS_WITH(decant::find_pipe_openings(decant::TriangleMesh{}), decant_test::contains("number of triangles"));
 }
 
+TEST_CASE("pipe network: what is narrow is so on all sides, also between sharp corners") {
+  PipeNetwork pipes;
+  pipes.radius = 0.018;
+  pipes.places = {{0, 0.2}, {0, 0}, {0.13, 0}, {0.13, -0.1}};
+  pipes.pipes = {
+      {0, 1}, {1, 2, {{0, 1}, {0.3, 0.6}, {0.55, 0.6}, {0.56, 0.3}, {0.64, 0.3}, {0.65, 0.6}, {1, 1}}}, {2, 3}};
+  const decant::TriangleMesh mesh = pipes.mesh();
+  const decant::BoundingVolumeHierarchy surface(mesh);
+  // across the middle of the narrow part, and just before and behind it
+  for (const auto& [x, factor] : {std::pair(0.6, 0.3), {0.57, 0.3}, {0.63, 0.3}, {0.53, 0.6}, {0.36, 0.6}}) {
+    const auto section = decant::pipe_section(surface, {0.13 * x, 0, 0}, {1, 0, 0}, 0.05);
+    REQUIRE(section);
+    INFO("share of the way " << x);
+    CHECK(section->area == Approx(factor * factor * pipes.bore_area()).epsilon(0.02));
+  }
+}
+
 TEST_CASE("pipe section: goes around a sharp corner, but not into a branch or through an end") {
   PipeNetwork pipes;
   pipes.radius = 0.01;

@@ -213,6 +213,29 @@ inline TriangleMesh PipeNetwork::mesh() const {
         offset.u = -offset.u;
       }
       const Ring near = corners(pipe.from, p, offsets), far = corners(pipe.to, p, reversed);
+      // Rings are cut straight across, but for those next to a mitred end, which lean as it does. What is narrow
+      // would be narrow at another place on each side of the pipe otherwise.
+      const double length = whole.norm();
+      const auto along_way = [&](const Vector3<double>& x) { return (Eigen::Vector2d(x.x(), x.z()) - begin).dot(way); };
+      double leans_until = 0, leans_from = length;
+      for (std::uint32_t k = 0; k < count; ++k) {
+        leans_until = std::max(leans_until, along_way(near[k]));
+        leans_from = std::min(leans_from, along_way(far[k]));
+      }
+      const auto place_along = [&](double share, std::uint32_t k) {
+        const double first_place = factor_at(0) * along_way(near[k]);
+        const double last_place = length - factor_at(1) * (length - along_way(far[k]));
+        const double straight = share * length;
+        if (leans_until >= leans_from) {  // too short for straight rings
+          return std::lerp(first_place, last_place, share);
+        }
+        if (straight < leans_until) {
+          return std::lerp(first_place, leans_until, straight / leans_until);
+        }
+        return straight > leans_from
+                   ? std::lerp(leans_from, last_place, (straight - leans_from) / (length - leans_from))
+                   : straight;
+      };
       for (const double share : shares) {
         const double bore_here = radius * factor_at(share);
         const double factor = outer ? (bore_here + wall) / (radius + wall) : bore_here / radius;
@@ -227,12 +250,7 @@ inline TriangleMesh PipeNetwork::mesh() const {
             result.vertices.push_back(x);
             continue;
           }
-          // along the line from corner to corner, at a bore of its own
-          const auto along_way = [&](const Vector3<double>& x) {
-            return (Eigen::Vector2d(x.x(), x.z()) - begin).dot(way);
-          };
-          const double along = (1 - share) * along_way(near[k]) + share * along_way(far[k]);
-          const Eigen::Vector2d at = begin + along * way + factor * offsets[k].u * left_of(way);
+          const Eigen::Vector2d at = begin + place_along(share, k) * way + factor * offsets[k].u * left_of(way);
           result.vertices.emplace_back(at.x(), factor * offsets[k].v, at.y());
         }
       }
