@@ -4,19 +4,15 @@
 // Recordings and results are kept in the folder: a run that was stopped goes on where it was, another only prints.
 // Exit status 0: done; 1: a recording could not be followed to its end; 2: a recording, a file or an argument is wrong.
 
-#include <algorithm>
-#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
-#include "support/experiment_report.hpp"
+#include "support/experiment_output.hpp"
 #include "support/fill_experiment.hpp"
 #include "support/fill_tables.hpp"
-#include "support/result_file.hpp"
 #include "support/tool.hpp"
 
 namespace {
@@ -71,33 +67,10 @@ int main(int count, char** values) {
     experiment.record(amounts);
     experiment.run(levels, methods);
     experiment.run(amounts, {});
-    auto sections = example::fill_tables(experiment, levels, amounts, methods);
-    const auto& results = experiment.folder().results();
-    for (auto& section : example::failures_of(results)) {
-      sections.push_back(std::move(section));
-    }
-    example::print_sections(sections);
-    const std::size_t recordings = levels.size() + amounts.size();
-    std::printf("%zu of %zu recordings made, %zu of %zu results computed\n", experiment.folder().recorded(), recordings,
-                experiment.folder().computed(), experiment.folder().asked());
-    if (!json_file.empty()) {
-      nlohmann::json json;
-      json["results"] = results;
-      json["tables"] = example::sections_json(sections);
-      example::write_result(json_file, json);
-    }
-    if (!report_file.empty()) {
-      example::write_experiment_report(
-          report_file, "How much was in it",
-          std::to_string(recordings) + (recordings == 1 ? " recording of " : " recordings of ") +
-              decant::detail::fixed_text(options.duration, 1) + " s; particles of " +
-              decant::detail::fixed_text(reality_mm, 1) +
-              " mm in reality, and 6000 of them in a full container of the model. The amount is hidden from the "
-              "estimates.",
-          sections);
-    }
-    return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
-               ? 1
-               : 0;
+    return example::tell_experiment({"How much was in it", levels.size() + amounts.size(), options.duration, reality_mm,
+                                     "6000 of them in a full container of the model. The amount is hidden from the "
+                                     "estimates."},
+                                    experiment.folder(), example::fill_tables(experiment, levels, amounts, methods),
+                                    json_file, report_file);
   });
 }

@@ -6,18 +6,15 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
-#include "support/experiment_report.hpp"
+#include "support/experiment_output.hpp"
 #include "support/junction_experiment.hpp"
 #include "support/junction_tables.hpp"
-#include "support/result_file.hpp"
 #include "support/tool.hpp"
 
 namespace {
@@ -85,32 +82,10 @@ int main(int count, char** values) {
       experiment.record(*cases);
       experiment.run(*cases, cases == &configurations ? methods : std::vector<std::string>{example::default_method});
     }
-    auto sections = example::junction_tables(experiment, configurations, openings, others, methods);
-    const auto& results = experiment.folder().results();
-    for (auto& section : example::failures_of(results)) {
-      sections.push_back(std::move(section));
-    }
-    example::print_sections(sections);
-    std::printf("%zu of %zu recordings made, %zu of %zu results computed\n", experiment.folder().recorded(), recordings,
-                experiment.folder().computed(), experiment.folder().asked());
-    if (!json_file.empty()) {
-      nlohmann::json json;
-      json["results"] = results;
-      json["tables"] = example::sections_json(sections);
-      example::write_result(json_file, json);
-    }
-    if (!report_file.empty()) {
-      example::write_experiment_report(report_file, "What blocks the junction",
-                                       std::to_string(recordings) +
-                                           (recordings == 1 ? " recording of " : " recordings of ") +
-                                           decant::detail::fixed_text(options.duration, 1) + " s; particles of " +
-                                           decant::detail::fixed_text(reality_mm, 1) +
-                                           " mm in reality, and five of them across a leg in the model. What blocks a "
-                                           "leg is hidden from the answers.",
-                                       sections);
-    }
-    return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
-               ? 1
-               : 0;
+    return example::tell_experiment(
+        {"What blocks the junction", recordings, options.duration, reality_mm,
+         "five of them across a leg in the model. What blocks a leg is hidden from the answers."},
+        experiment.folder(), example::junction_tables(experiment, configurations, openings, others, methods), json_file,
+        report_file);
   });
 }
