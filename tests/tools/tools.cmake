@@ -449,7 +449,7 @@ elseif(CASE STREQUAL "find_blockage_refuses")
 
 elseif(CASE STREQUAL "junction_experiment_scores_and_resumes")
   # as small as it goes: that figures arrive where they should; what they are is for the experiment itself
-  set(small --only pipe_right_1,pipe_left_30 --seconds 0.9 --spacing-mm 7 --model-spacing-mm 8)
+  set(small --only pipe_right_1,pipe_left_30 --seconds 0.5 --spacing-mm 9 --model-spacing-mm 14)
   run(0 all ${small} --json first.json --report out.html)
   if(NOT output MATCHES "2 of 2 recordings made, 2 of 2 results computed")
     message(FATAL_ERROR "the first run did not make two recordings and results:\n${output}")
