@@ -236,9 +236,9 @@ inline void record_junction(
   if (!twin.hidden_physics) {
     detail::record_junction<DefaultParts<>>(twin, errors, "divergence-free", folder, progress);
   } else {
-    // Not PositionBased, which throttles narrow places as no liquid does: through a leg that is 40 % open goes 0.39 of
-    // what goes through the other, where it is 0.55 here. Nor StateEquation, which throws liquid about where an inlet
-    // is below the surface, as this one is when a leg is blocked.
+    // Not PositionBased, which throttles narrow places as no liquid does: some 30 % less passes than here. Nor
+    // StateEquation, which throws liquid about where an inlet is below the surface, as this one is when a leg is
+    // blocked.
     detail::record_junction<RealityParts<Dfsph<float>>>(twin, errors, "divergence-free, another kernel", folder,
                                                         progress);
   }
