@@ -43,60 +43,44 @@ struct HypothesisFrame {
   Misfit misfit{};
 };
 
+/// Calls f with each number of a frame, in one order: for those that write them down and those that read them back.
+template <class Frame, class Function>
+void for_each_number(Frame& frame, Function&& f) {
+  f(frame.misfit.squared);
+  f(frame.misfit.measured);
+  auto& report = frame.report;
+  f(report.status);
+  f(report.time);
+  for (auto* each : {&report.prior, &report.posterior}) {
+    f(each->compared_px);
+    f(each->predicted_px);
+    f(each->observed_px);
+    f(each->both_px);
+    f(each->comparable);
+  }
+  f(report.log_likelihood);
+  f(report.correction.moved);
+  f(report.correction.mean_shift);
+  f(report.correction.relocated);
+  f(report.relocated_volume);
+  f(report.physics_ms);
+  f(report.drawing_ms);
+  f(report.correction_ms);
+  f(report.relaxation_ms);
+}
+
 /// As numbers, and back: counts and states are whole numbers below 2^53, which a double holds.
 inline JobResult numbers_of(const HypothesisFrame& frame) {
-  const FrameReport& report = frame.report;
   JobResult numbers;
   numbers.reserve(24);
-  const auto put = [&](auto value) { numbers.push_back(static_cast<double>(value)); };
-  put(frame.misfit.squared);
-  put(frame.misfit.measured);
-  put(report.status);
-  put(report.time);
-  for (const Overlap* each : {&report.prior, &report.posterior}) {
-    put(each->compared_px);
-    put(each->predicted_px);
-    put(each->observed_px);
-    put(each->both_px);
-    put(each->comparable);
-  }
-  put(report.log_likelihood);
-  put(report.correction.moved);
-  put(report.correction.mean_shift);
-  put(report.correction.relocated);
-  put(report.relocated_volume);
-  put(report.physics_ms);
-  put(report.drawing_ms);
-  put(report.correction_ms);
-  put(report.relaxation_ms);
+  for_each_number(frame, [&](const auto& value) { numbers.push_back(static_cast<double>(value)); });
   return numbers;
 }
 
 inline HypothesisFrame frame_of(const JobResult& numbers) noexcept {
   HypothesisFrame frame;
-  FrameReport& report = frame.report;
   auto next = numbers.begin();
-  const auto take = [&](auto& value) { value = static_cast<std::remove_reference_t<decltype(value)>>(*next++); };
-  take(frame.misfit.squared);
-  take(frame.misfit.measured);
-  report.status = static_cast<FrameStatus>(static_cast<int>(*next++));
-  take(report.time);
-  for (Overlap* each : {&report.prior, &report.posterior}) {
-    take(each->compared_px);
-    take(each->predicted_px);
-    take(each->observed_px);
-    take(each->both_px);
-    take(each->comparable);
-  }
-  take(report.log_likelihood);
-  take(report.correction.moved);
-  take(report.correction.mean_shift);
-  take(report.correction.relocated);
-  take(report.relocated_volume);
-  take(report.physics_ms);
-  take(report.drawing_ms);
-  take(report.correction_ms);
-  take(report.relaxation_ms);
+  for_each_number(frame, [&](auto& value) { value = static_cast<std::remove_reference_t<decltype(value)>>(*next++); });
   return frame;
 }
 
