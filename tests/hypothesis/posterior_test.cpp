@@ -202,16 +202,11 @@ TEST_CASE("posterior: what several sources say is multiplied") {
     CHECK(both.misfit(k).squared == seen_by_masks[k].squared);
     CHECK(both.misfit(k, source).squared == weighed[k].squared);
   }
-  // odds of hypotheses, and of none of these, are products of those of the sources over the prior's
+  // odds of hypotheses are products of those of the sources
   const auto odds = [](const Posterior& posterior, std::size_t k) {
     return posterior.probability(k) / posterior.probability(0);
   };
   CHECK(odds(both, 1) == Approx(odds(masks, 1) * odds(alone, 1)));
-  const double none_before = PosteriorSettings{}.none_prior / (0.5 * (1 - PosteriorSettings{}.none_prior));
-  const auto none_odds = [](const Posterior& posterior) {
-    return posterior.probability_of_none() / posterior.probability(0);
-  };
-  CHECK(none_odds(both) == Approx(none_odds(masks) * none_odds(alone) / none_before));
   CHECK(sum_of(both) == Approx(1));
 
   // a source by which all are equally far off takes nothing from what another says
@@ -221,6 +216,50 @@ TEST_CASE("posterior: what several sources say is multiplied") {
   both.observe(1, {std::nan(""), 0}, source);
   CHECK(both.excluded(1));
   CHECK_THROWS_WITH(both.add_source(scale), Catch::Contains("before a source is added"));
+}
+
+TEST_CASE("posterior: none of these may show in one source alone") {
+  const EvidenceSettings scale{6, 6, 0.1};
+  const double none_prior = PosteriorSettings{}.none_prior;
+  const auto weighed = [&](std::vector<double> by_masks, std::vector<double> by_scale) {
+    Posterior posterior;
+    posterior.add_source(scale);
+    for (std::size_t k = 0; k < by_masks.size(); ++k) {
+      posterior.observe(posterior.add(), {by_masks[k], 1000});
+      posterior.observe(k, {by_scale[k], 900}, 1);
+    }
+    return posterior;
+  };
+  // masks have one hypothesis right, and the scale has none
+  const Posterior split = weighed({20, 300}, {700, 800});
+  CHECK(split.probability_of_none() > 0.5);
+  CHECK(weighed({20, 300}, {3, 50}).probability_of_none() < 1e-3);
+  CHECK(weighed({900, 950}, {700, 800}).probability_of_none() > 0.9);
+  CHECK(sum_of(split) == Approx(1));
+
+  // by the sets of sources that it may show in: masks, scale, both
+  const double masks_off = 1000 * PosteriorSettings{}.hopeless_share, scale_off = 900 * scale.hopeless_share;
+  double sum = 0;
+  for (const auto& [mask, level] : {std::pair{20.0, 700.0}, {300.0, 800.0}}) {
+    for (const auto& [one, two] : {std::pair{masks_off, level}, {mask, scale_off}, {masks_off, scale_off}}) {
+      sum += std::exp(split.log_likelihood(one) + split.log_likelihood(two, 1)) / 3;
+    }
+  }
+  CHECK(split.log_posterior_of_none() == Approx(std::log(none_prior / (1 - none_prior) * sum)));
+
+  // a source that has measured nothing yet has no say in it
+  Posterior masks, both;
+  both.add_source(scale);
+  for (Posterior* posterior : {&masks, &both}) {
+    CHECK(posterior->log_posterior_of_none() == -std::numeric_limits<double>::infinity());
+    posterior->observe(posterior->add(), {20, 1000});
+    posterior->observe(posterior->add(), {300, 1000});
+  }
+  CHECK(both.log_posterior_of_none() == Approx(masks.log_posterior_of_none()));
+  // one that was given up helps none of these no more than it did
+  Posterior pruned = weighed({20, 300}, {700, 800});
+  pruned.exclude(1);
+  CHECK(pruned.log_posterior_of_none() < split.log_posterior_of_none());
 }
 
 TEST_CASE("posterior: settings out of range are refused") {

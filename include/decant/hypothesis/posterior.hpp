@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <decant/core/expects.hpp>
@@ -135,18 +136,37 @@ class Posterior {
     }
     return sum;
   }
-  /// The same for "none of these", which is taken to be off by hopeless_share of the liquid in play: of what was
-  /// measured or, where hypotheses are off by more than all of that, of what they are off by on average (an empty
-  /// container, beside one hypothesis that says so and others that predicted liquid). -infinity if it has no prior.
+  /// The same for "none of these": something else is so, which shows in one or more of the sources. By such a source it
+  /// is taken to be off by hopeless_share of the liquid in play: of what was measured or, where hypotheses are off by
+  /// more than all of that, of what they are off by on average (an empty container, beside one hypothesis that says so
+  /// and others that predicted liquid). In the sources in which it does not show it predicts what one of the hypotheses
+  /// does. Which sources it shows in is not known: all sets of them are as probable. -infinity if it has no prior.
   double log_posterior_of_none() const noexcept {
     if (settings_.none_prior == 0) {
       return -std::numeric_limits<double>::infinity();
     }
-    double sum = std::log(settings_.none_prior / (1 - settings_.none_prior)) + total_log_prior();
+    constexpr double nothing = -std::numeric_limits<double>::infinity();
+    std::vector<std::pair<std::size_t, double>> hopeless;  // sources that have measured something, what they then say
     for (std::size_t source = 0; source < sources_.size(); ++source) {
-      sum += log_likelihood(sources_[source].hopeless_share * in_play(source), source);
+      if (const double of = in_play(source); of > 0) {
+        hopeless.emplace_back(source, log_likelihood(sources_[source].hopeless_share * of, source));
+      }
     }
-    return sum;
+    double sum = nothing;
+    for (const Hypothesis& one : hypotheses_) {
+      // over the sources so far: it shows in none of them, or in some
+      double hidden = one.log_prior, shown = nothing;
+      for (const auto& [source, here] : hopeless) {
+        const double not_here = one.excluded ? nothing : log_likelihood(one.misfits[source].squared, source);
+        shown = log_of_sum(shown + log_of_sum(here, not_here), hidden + here);
+        hidden += not_here;
+      }
+      sum = log_of_sum(sum, hopeless.empty() ? hidden : shown);
+    }
+    if (!hopeless.empty()) {
+      sum -= std::log(std::exp2(static_cast<double>(hopeless.size())) - 1);  // all sets of sources but the empty one
+    }
+    return std::log(settings_.none_prior / (1 - settings_.none_prior)) + sum;
   }
 
   double probability(std::size_t hypothesis) const {
@@ -196,13 +216,9 @@ class Posterior {
     }
     return count > 0 ? total / static_cast<double>(count) : measured;
   }
-  // Priors are up to a constant: "none of these" has its share of what they come to.
-  double total_log_prior() const noexcept {
-    double total = 0;
-    for (const Hypothesis& one : hypotheses_) {
-      total += std::exp(one.log_prior);
-    }
-    return std::log(total);
+  static double log_of_sum(double a, double b) noexcept {
+    const double larger = std::max(a, b);
+    return std::isfinite(larger) ? larger + std::log1p(std::exp(std::min(a, b) - larger)) : larger;
   }
   double log_sum() const noexcept {
     double largest = log_posterior_of_none();
