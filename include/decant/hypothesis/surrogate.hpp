@@ -47,12 +47,12 @@ class Surrogate {
     std::gamma_distribution<double> half_chi_squared(0.5 * freedom, 1);
     // each of the candidates that are drawn from costs a factorization
     constexpr int together = 8;
+    const int groups = (count + together - 1) / together;
     int column = 0;
     double below = 0;
     for (const Candidate& candidate : candidates_) {
       below += candidate.weight;
-      const int end =
-          std::clamp(together * static_cast<int>(std::floor(below * count / together + 0.5)), column, count);
+      const int end = std::clamp(together * static_cast<int>(std::floor(below * groups + 0.5)), column, count);
       if (end == column) {
         continue;
       }
