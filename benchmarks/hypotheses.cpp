@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 /// What it costs to ask several hypotheses instead of one. K of them on two cores, over K/2 times what one takes on one
 /// thread, which is all that there is to gain; also beside one on both threads. And what giving up hopeless ones saves:
-/// recordings of a pipe junction (of the example `record_junction`), judged with and without, and whether any answer
-/// differs. Runs take turns.
+/// recordings of a pipe junction (of the example `record_junction`), judged with and without (and without trying all in
+/// coarse particles first), and whether any answer differs. Runs take turns.
 
 #include <algorithm>
 #include <cmath>
@@ -182,6 +182,9 @@ void giving_up(const Options& options, Report& report) {
     };
     add("frames simulated", static_cast<double>(of_all.course.frames_run),
         static_cast<double>(of_pruned.course.frames_run), "");
+    report.add(title, {.name = "frames simulated in coarse particles, hopeless ones given up",
+                       .value = static_cast<double>(of_pruned.course.scouted_frames_run),
+                       .unit = ""});
     add("processor time", seconds_all, seconds_pruned, "s");
     const std::string answer = example::blockage_answer(of_all), other = example::blockage_answer(of_pruned);
     const auto certainty = [](const example::BlockageResult& result, const std::string& of) {

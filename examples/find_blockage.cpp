@@ -74,7 +74,7 @@ void add_openings(decant::HtmlReport& report, const example::BlockageResult& res
   report.heading("How much of each leg is open");
   report.table(openings_of(result));
   report.paragraph("From .. to: the " + std::to_string(std::lround(100 * options.confidence)) +
-                   " % interval, where at most one leg is not wholly open.");
+                   " % interval, where all openings were as probable before.");
   const std::size_t frames = result.course.time.size();
   std::vector<example::NamedDensity> densities;
   decant::LineChart course{"The opening over time", "time [s]", "open [%]", {}, {}, {0, 100}};
@@ -102,15 +102,22 @@ void write_report(const std::string& file, const decant::Recording& recording, c
   report.heading("Every hypothesis");
   for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
     report.chart(example::course_chart("Opening of one leg [%]: " + result.legs[leg].name, result.course, "",
-                                       [&](std::size_t k) { return !result.leg[k] || result.leg[k] == leg; }));
+                                       [&](std::size_t k) {
+                                         const std::size_t blocked = example::blocked_legs(result, k);
+                                         return blocked == 0 || (blocked == 1 && example::blocks(result, k, leg));
+                                       }));
   }
   report.chart(example::followed_chart({{"legs and openings", &result.course}}));
-  report.paragraph(std::to_string(result.course.frames_run) + " frames were simulated, " +
-                   decant::detail::fixed_text(100.0 * static_cast<double>(result.course.frames_run) /
-                                                  static_cast<double>(std::max<std::size_t>(
-                                                      1, result.course.names.size() * result.course.time.size())),
-                                              0) +
-                   " % of what it takes to follow every hypothesis to the end.");
+  const double all =
+      static_cast<double>(std::max<std::size_t>(1, result.course.names.size() * result.course.time.size()));
+  const auto share = [&](std::size_t frames) {
+    return std::to_string(frames) + " frames were simulated, " +
+           decant::detail::fixed_text(100.0 * static_cast<double>(frames) / all, 0) +
+           " % of what it takes to follow every hypothesis to the end";
+  };
+  const std::size_t scouted = result.course.scouted_frames_run;
+  report.paragraph(share(result.course.frames_run) +
+                   (scouted > 0 ? "; before, in coarse particles, " + share(scouted) : "") + ".");
   example::add_best_overlays(report, recording, {{options.method, &result.course}}, "", {options.tracking.threads});
   report.write(file);
 }

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -24,20 +25,27 @@
 #include <decant/io/recording.hpp>
 
 #include "hypothesis_run.hpp"
+#include "scouting.hpp"
 
 namespace example {
 
 struct BlockageOptions {
   std::string method = default_method;
-  /// Of a leg that is blocked in part, those that are tried, increasing between 0 and 1; 0 and 1 are in any case.
-  std::vector<double> openings{0.2, 0.4, 0.6, 0.8};
+  /// Of a leg that is blocked in part, those that are tried, increasing between 0 and 1; 0 and 1 are in any case. What
+  /// a leg lets pass that is more than 0.6 open can hardly be told from an open one, so these are denser below.
+  std::vector<double> openings{0.2, 0.4, 0.6};
+  /// Of two legs that are blocked at once, each of one with each of the other. Both together are none of the
+  /// configurations that are asked about, and it is noticed best if it is tried.
+  std::vector<double> openings_of_two{0.2, 0.4};
   double confidence = 0.9;
   double particles_across = 5;  ///< of a leg's bore, where tracking.spacing is 0
+  double scouts_across = 3;     ///< the same for coarse particles, see ScoutingSettings; 0: no scouting
   TrackingOptions tracking{};
-  /// Hypotheses below this share of the best one's are given up. At ten times as much, the opening that all frames
-  /// together favoured was once given up at the beginning of the outflow.
+  /// Hypotheses below this share of the best one's are given up, 0: none, nor are there scouts. At ten times as much,
+  /// the opening that all frames together favoured was once given up at the beginning of the outflow.
   double least_probability = 1e-4;
   decant::PosteriorSettings posterior{};
+  RelocationEvidence relocation{};  ///< by the default method, the only one that relocates
 };
 
 /// A way out of the junction.
@@ -51,10 +59,9 @@ struct BlockageResult {
   std::vector<JunctionLeg> legs;
   double spacing = 0;  ///< of the particles [m]
   PosteriorCourse course;
-  std::vector<std::optional<std::size_t>> leg;  ///< by hypothesis; nothing where no leg is blocked
-  std::vector<double> opening;                  ///< by hypothesis, 0 .. 1
-  std::vector<double> log_prior;                ///< by hypothesis [nat]
-  /// By configuration (none, <leg>, <leg>_partial ..) and frame; of "none of these" at last.
+  std::vector<std::vector<double>> opening;  ///< by hypothesis and leg, 0 .. 1
+  std::vector<double> log_prior;             ///< by hypothesis [nat]
+  /// By configuration (none, <leg>, <leg>_partial ..) and frame; of "none of these" at last, with several legs at once.
   std::vector<std::pair<std::string, std::vector<double>>> configurations;
   std::vector<std::optional<decant::ValueEstimate>> leg_opening;  ///< by leg, 0 .. 1; nothing if it failed at once
 };
@@ -113,47 +120,125 @@ inline std::vector<JunctionLeg> junction_legs(const decant::Recording& recording
   return legs;
 }
 
-namespace detail {
-
-inline double log_of_sum(const std::vector<double>& logs) {
-  const double largest =
-      logs.empty() ? -std::numeric_limits<double>::infinity() : *std::max_element(logs.begin(), logs.end());
-  if (!std::isfinite(largest)) {
-    return largest;
-  }
-  double sum = 0;
-  for (const double each : logs) {
-    sum += std::exp(each - largest);
-  }
-  return largest + std::log(sum);
+/// How many legs are not wholly open under a hypothesis, and whether one of them is this one.
+inline std::size_t blocked_legs(const BlockageResult& result, std::size_t hypothesis) {
+  const std::vector<double>& opening = result.opening[hypothesis];
+  return static_cast<std::size_t>(std::count_if(opening.begin(), opening.end(), [](double each) { return each < 1; }));
+}
+inline bool blocks(const BlockageResult& result, std::size_t hypothesis, std::size_t leg) {
+  return result.opening[hypothesis][leg] < 1;
 }
 
-}  // namespace detail
-
-/// A leg's opening after a frame, whatever the other legs' are; at most one of them is not wholly open. Nothing where
-/// every hypothesis has failed.
+/// A leg's opening after a frame, whatever the other legs' are. Nothing where every hypothesis has failed.
 inline std::optional<decant::ValueDensity> opening_density(const BlockageResult& result, std::size_t leg,
                                                            std::size_t frame) {
   const std::vector<double> log_posterior = result.course.log_posterior_at(frame);
-  std::vector<double> opening, log_density, open;
+  std::map<double, std::vector<double>> of_opening;
+  std::map<double, double> log_prior;  // where the other legs are open: all openings of this one are as probable
   for (std::size_t k = 0; k < log_posterior.size(); ++k) {
-    const double likelihood = log_posterior[k] - result.log_prior[k];
-    if (result.leg[k] == leg) {
-      opening.push_back(result.opening[k]);
-      log_density.push_back(likelihood);
-    } else if (!result.leg[k]) {
-      open.push_back(likelihood);
-    } else {
-      open.push_back(log_posterior[k]);
+    const double opening = result.opening[k][leg];
+    of_opening[opening].push_back(log_posterior[k]);
+    if (blocked_legs(result, k) == (opening < 1 ? 1 : 0)) {
+      log_prior[opening] = result.log_prior[k];
     }
   }
-  opening.push_back(1);
-  log_density.push_back(detail::log_of_sum(open));
+  std::vector<double> opening, log_density;
+  for (const auto& [value, logs] : of_opening) {
+    if (log_prior.contains(value)) {
+      opening.push_back(value);
+      log_density.push_back(log_of_sum(logs) - log_prior[value]);
+    }
+  }
   if (std::none_of(log_density.begin(), log_density.end(), [](double each) { return std::isfinite(each); })) {
     return std::nullopt;
   }
   return decant::ValueDensity(opening, log_density);
 }
+
+namespace detail {
+
+/// What may be so: nothing blocked, one leg with each of the openings, two of them.
+inline HypothesisSet blockages(const decant::Recording& recording, std::size_t body, const BlockageOptions& options,
+                               BlockageResult& result) {
+  using namespace decant;
+  HypothesisSet set;
+  const std::size_t legs = result.legs.size();
+  const auto name_of = [&](std::size_t leg, double opening) {
+    return result.legs[leg].name + "_" + std::to_string(std::lround(100 * opening));
+  };
+  const auto add = [&](const std::string& name, const std::vector<std::pair<std::size_t, double>>& blocked,
+                       double share) {
+    std::vector<double> opening(legs, 1.0);
+    for (const auto& [leg, open] : blocked) {
+      opening[leg] = open;
+    }
+    set.names.push_back(name);
+    set.log_prior.push_back(std::log(share));
+    result.opening.push_back(std::move(opening));
+  };
+  // Configurations are as probable as each other, whatever the number of openings that one stands for, and so are all
+  // pairs of legs together.
+  add("none", {}, 1);
+  for (std::size_t leg = 0; leg < legs; ++leg) {
+    add(name_of(leg, 0), {{leg, 0.0}}, 1);
+    for (const double opening : options.openings) {
+      add(name_of(leg, opening), {{leg, opening}}, 1 / static_cast<double>(options.openings.size()));
+    }
+  }
+  const double pairs =
+      0.5 * static_cast<double>(legs * (legs - 1) * options.openings_of_two.size() * options.openings_of_two.size());
+  for (std::size_t one = 0; one < legs; ++one) {
+    for (std::size_t two = one + 1; two < legs; ++two) {
+      for (const double first : options.openings_of_two) {
+        for (const double second : options.openings_of_two) {
+          add(name_of(one, first) + "_" + name_of(two, second), {{one, first}, {two, second}}, 1 / pairs);
+        }
+      }
+    }
+  }
+  set.model = [&recording, &options, &result, body](std::size_t k, double spacing) {
+    // One body with the junction: walls of several bodies add up where one is behind another's. How long a blockage is
+    // hardly matters: from 0.4 to 1 of the leg's width, 0.33 to 0.34 of what the other leg lets pass (40 % open).
+    Recording blocked = recording;
+    for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+      if (blocks(result, k, leg)) {
+        const PipeSection& section = result.legs[leg].section;
+        blocked.bodies[body].mesh =
+            joined(blocked.bodies[body].mesh, pipe_blockage(section, result.opening[k][leg], 2 * section.radius()));
+      }
+    }
+    TrackingOptions tracking = options.tracking;
+    tracking.spacing = spacing;
+    return model_of<TrackingParts>(blocked, tracking);
+  };
+  // next to each other: they differ in one leg, and none has an opening in between there
+  set.neighbours = [&result](std::size_t a, std::size_t b) {
+    const auto differ = [&](std::size_t first, std::size_t second) {
+      std::vector<std::size_t> in;
+      for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+        if (result.opening[first][leg] != result.opening[second][leg]) {
+          in.push_back(leg);
+        }
+      }
+      return in;
+    };
+    const std::vector<std::size_t> in = differ(a, b);
+    if (in.size() != 1) {
+      return false;
+    }
+    const auto [low, high] = std::minmax(result.opening[a][in[0]], result.opening[b][in[0]]);
+    for (std::size_t k = 0; k < result.opening.size(); ++k) {
+      const double opening = result.opening[k][in[0]];
+      if (opening > low && opening < high && differ(a, k) == in) {
+        return false;
+      }
+    }
+    return true;
+  };
+  return set;
+}
+
+}  // namespace detail
 
 /// @param progress is told the share that is done, 0 .. 1. Throws std::runtime_error for a recording without a
 /// junction, std::invalid_argument for options that make no sense.
@@ -170,60 +255,46 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
   result.junction = recording.bodies[body].name;
   result.legs = junction_legs(recording, body);
   TrackingOptions tracking = options.tracking;
+  double narrowest = std::numeric_limits<double>::infinity();
+  for (const JunctionLeg& leg : result.legs) {
+    narrowest = std::min(narrowest, leg.section.radius());
+  }
   if (tracking.spacing == 0) {
-    double narrowest = std::numeric_limits<double>::infinity();
-    for (const JunctionLeg& leg : result.legs) {
-      narrowest = std::min(narrowest, leg.section.radius());
-    }
     tracking.spacing = 2 * narrowest / options.particles_across;
   }
   result.spacing = tracking.spacing;
-  std::vector<NamedModel> models{{"none", model_of<TrackingParts>(recording, tracking), 0}};
-  result.leg.emplace_back();
-  result.opening.push_back(1);
-  std::vector<double> openings{0};
-  openings.insert(openings.end(), options.openings.begin(), options.openings.end());
-  for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
-    for (const double opening : openings) {
-      // configurations are as probable as each other, whatever the number of openings that one stands for
-      const double log_prior = opening > 0 ? -std::log(static_cast<double>(options.openings.size())) : 0;
-      // One body with the junction: walls of several bodies add up where one is behind another's. How long a blockage
-      // is hardly matters: from 0.4 to 1 of the leg's width, 0.33 to 0.34 of what the other leg lets pass (40 % open).
-      const PipeSection& section = result.legs[leg].section;
-      Recording blocked = recording;
-      blocked.bodies[body].mesh =
-          joined(recording.bodies[body].mesh, pipe_blockage(section, opening, 2 * section.radius()));
-      models.push_back({result.legs[leg].name + "_" + std::to_string(std::lround(100 * opening)),
-                        model_of<TrackingParts>(blocked, tracking), log_prior});
-      result.leg.emplace_back(leg);
-      result.opening.push_back(opening);
-    }
+  const HypothesisSet set = detail::blockages(recording, body, options, result);
+  result.log_prior = set.log_prior;
+  WeighingSettings settings;
+  settings.filter.posterior = options.posterior;
+  settings.filter.least_probability = options.least_probability;
+  if (options.method == default_method) {
+    settings.relocation = options.relocation;
   }
-  for (const NamedModel& model : models) {
-    result.log_prior.push_back(model.log_prior);
+  ScoutingSettings scouting;
+  if (options.scouts_across > 0 && options.least_probability > 0) {
+    scouting.spacing = 2 * narrowest / options.scouts_across;
   }
-  HypothesisFilterSettings settings;
-  settings.posterior = options.posterior;
-  settings.least_probability = options.least_probability;
-  result.course = weigh_by(options.method, recording, models, tracking, settings, progress);
+  result.course = weigh_scouted(options.method, recording, set, tracking, settings, scouting, progress);
 
   const std::vector<std::vector<double>> probability = result.course.probability();
-  const auto sum_of = [&](const std::string& name, auto belongs) {
-    std::vector<double> sum(result.course.time.size(), 0.0);
-    for (std::size_t k = 0; k < models.size(); ++k) {
+  const auto sum_of = [&](const std::string& name, std::vector<double> sum, auto belongs) {
+    for (std::size_t k = 0; k < set.size(); ++k) {
       for (std::size_t frame = 0; belongs(k) && frame < sum.size(); ++frame) {
         sum[frame] += probability[k][frame];
       }
     }
     result.configurations.emplace_back(name, std::move(sum));
   };
-  sum_of("none", [&](std::size_t k) { return !result.leg[k]; });
+  const std::vector<double> nothing(result.course.time.size(), 0.0);
+  sum_of("none", nothing, [&](std::size_t k) { return blocked_legs(result, k) == 0; });
   for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
     const std::string& name = result.legs[leg].name;
-    sum_of(name, [&](std::size_t k) { return result.leg[k] == leg && result.opening[k] == 0; });
-    sum_of(name + "_partial", [&](std::size_t k) { return result.leg[k] == leg && result.opening[k] > 0; });
+    const auto only = [&result, leg](std::size_t k) { return blocked_legs(result, k) == 1 && blocks(result, k, leg); };
+    sum_of(name, nothing, [&](std::size_t k) { return only(k) && result.opening[k][leg] == 0; });
+    sum_of(name + "_partial", nothing, [&](std::size_t k) { return only(k) && result.opening[k][leg] > 0; });
   }
-  result.configurations.emplace_back(PosteriorCourse::none_name, probability.back());
+  sum_of(PosteriorCourse::none_name, probability.back(), [&](std::size_t k) { return blocked_legs(result, k) > 1; });
   for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
     const std::size_t frames = result.course.time.size();
     const auto density = frames > 0 ? opening_density(result, leg, frames - 1) : std::nullopt;
@@ -279,16 +350,20 @@ inline nlohmann::json blockage_json(const BlockageResult& result, double confide
     }
   }
   for (std::size_t k = 0; k < result.course.names.size(); ++k) {
-    json["hypotheses"].push_back(
-        {{"name", result.course.names[k]},
-         {"opening", result.opening[k]},
-         {"leg", result.leg[k] ? nlohmann::json(result.legs[*result.leg[k]].name) : nlohmann::json()},
-         {"probability", number_json(last[k])},
-         {"log_posterior", number_json(log_posterior[k])},
-         {"squared_misfit", number_json(result.course.evidence[k].before.squared)},
-         {"measured", number_json(result.course.evidence[k].before.measured)}});
+    nlohmann::json openings;
+    for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
+      openings[result.legs[leg].name] = result.opening[k][leg];
+    }
+    json["hypotheses"].push_back({{"name", result.course.names[k]},
+                                  {"opening", openings},
+                                  {"probability", number_json(last[k])},
+                                  {"log_posterior", number_json(log_posterior[k])},
+                                  {"squared_misfit", number_json(result.course.evidence[k].before.squared)},
+                                  {"measured", number_json(result.course.evidence[k].before.measured)},
+                                  {"relocated_ml", number_json(result.course.evidence[k].relocated_ml)}});
   }
   json["frames_run"] = result.course.frames_run;
+  json["scouted_frames_run"] = result.course.scouted_frames_run;
   json["followed"] = column_json(result.course.followed);
   return json;
 }

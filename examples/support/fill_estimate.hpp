@@ -132,9 +132,9 @@ inline FillResult estimate_fill(const decant::Recording& told, const FillOptions
     for (const int percent : chosen) {
       models.push_back({std::to_string(percent), filled.at(percent)});
     }
-    HypothesisFilterSettings settings;
-    settings.posterior = options.posterior;
-    settings.least_probability = least_probability;
+    WeighingSettings settings;
+    settings.filter.posterior = options.posterior;
+    settings.filter.least_probability = least_probability;
     PosteriorCourse course = weigh_by(method, recording, models, tracking, settings, [&](double share) {
       progress(method, (done + share * static_cast<double>(chosen.size())) / all);
     });

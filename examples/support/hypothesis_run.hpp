@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,6 +29,20 @@
 #include "tracking_run.hpp"
 
 namespace example {
+
+/// Log of the sum of exponentials; -infinity for none.
+inline double log_of_sum(const std::vector<double>& logs) {
+  const double largest =
+      logs.empty() ? -std::numeric_limits<double>::infinity() : *std::max_element(logs.begin(), logs.end());
+  if (!std::isfinite(largest)) {
+    return largest;
+  }
+  double sum = 0;
+  for (const double each : logs) {
+    sum += std::exp(each - largest);
+  }
+  return largest + std::log(sum);
+}
 
 /// Something that may be so, and the model as it starts if it is.
 struct NamedModel {
@@ -58,8 +73,9 @@ struct PosteriorCourse {
   /// Of the one that was best in each frame, as it was predicted before that frame's correction, where options ask for
   /// them.
   std::vector<Overlay> overlays;
-  std::vector<double> followed;  ///< how many hypotheses are, by frame
-  std::size_t frames_run = 0;    ///< of all hypotheses together: those given up save theirs
+  std::vector<double> followed;        ///< how many hypotheses are, by frame
+  std::size_t frames_run = 0;          ///< of all hypotheses together: those given up save theirs
+  std::size_t scouted_frames_run = 0;  ///< in coarse particles, beforehand
   std::string status = "ok";
 
   /// Of a hypothesis by frame; of "none of these" after the last hypothesis.
@@ -135,16 +151,32 @@ inline std::vector<double> probability_schenck2017(const PosteriorCourse& course
   return probability;
 }
 
+/// What it says of hypotheses how much liquid the corrector had to take from one place to another: a right one needs
+/// little of that, whereas liquid that comes out where no hypothesis lets it has to be taken there again and again.
+/// Shares are of all liquid that there is.
+struct RelocationEvidence {
+  double independent_errors = 20;  ///< see decant::PosteriorSettings
+  double usual_share = 0.02;       ///< right hypotheses need no more (0.3 to 0.6 % where a pipe branches)
+  double hopeless_share = 0.04;    ///< twice that: beyond it "none of these" is more probable
+};
+
+struct WeighingSettings {
+  decant::HypothesisFilterSettings filter{};
+  std::optional<RelocationEvidence> relocation{};  ///< nothing: only silhouettes count
+};
+
 /// @param progress is told the share that is done, 0 .. 1.
 template <class CorrectorType>
 PosteriorCourse weigh(const decant::Recording& recording, const std::vector<NamedModel>& hypotheses,
-                      const TrackingOptions& options, const decant::HypothesisFilterSettings& settings,
+                      const TrackingOptions& options, const WeighingSettings& settings,
                       const std::function<void(double)>& progress) {
   using namespace decant;
   PosteriorCourse course;
   TrackingOptions each = options;
   each.threads = 1;  // simulations run side by side
-  HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings, ThreadExecutor{{options.threads}});
+  HypothesisFilter<Tracker<TrackingModel, CorrectorType>> filter(settings.filter, ThreadExecutor{{options.threads}});
+  const std::size_t relocation = settings.relocation ? filter.add_source({}) : 0;
+  std::vector<double> volume(hypotheses.size(), 0.0);  // of liquid [m^3]
   for (const NamedModel& hypothesis : hypotheses) {
     course.names.push_back(hypothesis.name);
     filter.add(tracker_for(recording, hypothesis.model, CorrectorType(), each), hypothesis.log_prior);
@@ -162,7 +194,6 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
     }
     course.time.push_back(recording.timestamps[frame]);
     for (std::size_t k = 0; k < hypotheses.size(); ++k) {
-      course.log_posterior[k].push_back(filter.log_posterior(k));
       if (!filter.given_up(k)) {
         const FrameReport& own = filter.report(k);
         Evidence& evidence = course.evidence[k];
@@ -173,7 +204,19 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
         const double particle_ml = 1e6 * std::pow(filter.tracker(k).model().spacing(), 3);
         evidence.moved_ml_m += particle_ml * static_cast<double>(own.correction.moved) * own.correction.mean_shift;
         evidence.relocated_ml += 1e6 * own.relocated_volume;
+        if (settings.relocation) {
+          const double now = 1e-6 * particle_ml * static_cast<double>(filter.tracker(k).model().fluid().size());
+          filter.observe(k, {own.relocated_volume, now - std::exchange(volume[k], now)}, relocation);
+        }
       }
+    }
+    const double most = hypotheses.empty() ? 0 : *std::max_element(volume.begin(), volume.end());
+    if (settings.relocation && most > 0) {
+      filter.set_source(relocation, {settings.relocation->independent_errors, settings.relocation->usual_share * most,
+                                     settings.relocation->hopeless_share});
+    }
+    for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+      course.log_posterior[k].push_back(filter.log_posterior(k));
     }
     course.followed.push_back(static_cast<double>(filter.running()));
     course.log_none.push_back(filter.posterior().log_posterior_of_none());
@@ -199,8 +242,7 @@ inline const std::vector<std::string>& weighing_methods() {
 /// The same by name. Throws std::invalid_argument for another name.
 inline PosteriorCourse weigh_by(const std::string& method, const decant::Recording& recording,
                                 const std::vector<NamedModel>& hypotheses, const TrackingOptions& options,
-                                const decant::HypothesisFilterSettings& settings,
-                                const std::function<void(double)>& progress) {
+                                const WeighingSettings& settings, const std::function<void(double)>& progress) {
   using namespace decant;
   if (method == "open_loop") {
     return weigh<OpenLoop<>>(recording, hypotheses, options, settings, progress);
