@@ -196,20 +196,27 @@ inline HypothesisSet blockages(const decant::Recording& recording, std::size_t b
       }
     }
   }
-  set.model = [&recording, &options, &result, body](std::size_t k, double spacing) {
+  set.model = [&recording, &options, &result, body, open = std::map<double, TrackingModel>()](std::size_t k,
+                                                                                              double spacing) mutable {
+    if (!open.contains(spacing)) {
+      TrackingOptions tracking = options.tracking;
+      tracking.spacing = spacing;
+      open.emplace(spacing, model_of<TrackingParts>(recording, tracking));
+    }
     // One body with the junction: walls of several bodies add up where one is behind another's. How long a blockage is
     // hardly matters: from 0.4 to 1 of the leg's width, 0.33 to 0.34 of what the other leg lets pass (40 % open).
-    Recording blocked = recording;
+    TrackingModel model = open.at(spacing);
+    TriangleMesh mesh = recording.bodies[body].mesh;
     for (std::size_t leg = 0; leg < result.legs.size(); ++leg) {
       if (blocks(result, k, leg)) {
         const PipeSection& section = result.legs[leg].section;
-        blocked.bodies[body].mesh =
-            joined(blocked.bodies[body].mesh, pipe_blockage(section, result.opening[k][leg], 2 * section.radius()));
+        mesh = joined(mesh, pipe_blockage(section, result.opening[k][leg], 2 * section.radius()));
       }
     }
-    TrackingOptions tracking = options.tracking;
-    tracking.spacing = spacing;
-    return model_of<TrackingParts>(blocked, tracking);
+    if (blocked_legs(result, k) > 0) {
+      model.replace_shape(static_cast<BodyId>(body), std::move(mesh));
+    }
+    return model;
   };
   // next to each other: they differ in one leg, and none has an opening in between there
   set.neighbours = [&result](std::size_t a, std::size_t b) {

@@ -277,6 +277,53 @@ TEST_CASE("simulator: settings for tracking take half the sub-steps, and liquid 
   CHECK(rested.speed < 0.03);  // a tenth of sqrt(g d)
 }
 
+TEST_CASE("simulator: a body of another shape is as if it had been added with that one") {
+  const auto post = [](double radius) { return BodyShape(TriangleMesh(Cylinder{radius, 0.16}.mesh())); };
+  const PoseTrack where(Pose{Eigen::Quaterniond::Identity(), {0.024, 0.024, -0.08}});
+  const auto scene = [&](double radius) {
+    Simulator<> simulator(with_spacing(0.008));
+    simulator.add_body("post", post(radius), where, Slip::None);
+    simulator.add_body("box", BoxInside{{0, 0, 0}, {0.048, 0.048, 0.08}, 0.002, Face::PositiveZ});
+    return simulator;
+  };
+  const auto end_of = [](Simulator<> simulator) {
+    const auto x = block<float>(6, 6, 5, 0.008);
+    simulator.add_particles(x, PointArray<float>::Zero(3, x.cols()), 3);
+    for (int k = 0; k < 6; ++k) {
+      REQUIRE(simulator.step(1.0 / 60).advanced());
+    }
+    return PointArray<float>(simulator.fluid().position);
+  };
+  const Simulator<> thin = scene(0.006);
+  Simulator<> replaced = thin;
+  replaced.replace_shape(0, post(0.012));
+  CHECK(replaced.bodies()[0].name == "post");
+  CHECK(replaced.bodies()[0].slip == Slip::None);
+  const PointArray<float> expected = end_of(scene(0.012)), unchanged = end_of(scene(0.006));
+  CHECK(end_of(replaced) == expected);
+  CHECK(end_of(thin) == unchanged);
+  CHECK(expected != unchanged);
+
+  // liquid makes room, and a run goes on
+  Simulator<> running = scene(0.006);
+  const auto x = block<float>(6, 6, 5, 0.008);
+  running.add_particles(x, PointArray<float>::Zero(3, x.cols()), 3);
+  running.watch_contents(1);
+  REQUIRE(running.step(1.0 / 60).advanced());
+  running.replace_shape(0, post(0.012));
+  for (Index i = 0; i < running.fluid().size(); ++i) {
+    CHECK((running.fluid().position.col(i).head<2>() - Eigen::Vector2f(0.024F, 0.024F)).norm() > 0.012F);
+  }
+  REQUIRE(running.step(1.0 / 60).advanced());
+  CHECK(running.step(1.0 / 60).contents.size() == 1);
+  running.replace_shape(1, BoxInside{{0, 0, 0}, {0.048, 0.048, 0.09}, 0.002, Face::PositiveZ});
+  CHECK(running.step(1.0 / 60).contents.size() == 0);
+
+  CHECK_THROWS_WITH(running.replace_shape(2, post(0.012)), Catch::Contains("body"));
+  CHECK_THROWS_AS(running.replace_shape(0, BodyShape(TriangleMesh{})), std::invalid_argument);
+  CHECK(running.bodies()[0].bounds.max().x() == Approx(0.012).epsilon(0.01));
+}
+
 TEST_CASE("simulator: a periodic channel keeps its liquid and its mass") {
   struct Channel : DefaultParts<double> {
     using Domain = PeriodicDomain<double>;

@@ -69,25 +69,21 @@ class RigidBodies {
   template <class Kernel>
   BodyId add(std::string name, BodyShape shape, PoseTrack motion, Slip slip, double smoothing_length, double spacing,
              Threads threads) {
-    half_space_ = HalfSpace::of<Kernel>(smoothing_length);
-    reach_ = WallFunction::of<Kernel>(smoothing_length, spacing).reach();
     Body body;
     body.name = std::move(name);
-    body.shape = std::make_shared<const BodyShape>(std::move(shape));
-    body.surface = std::make_shared<const BoundingVolumeHierarchy>(body.shape->mesh);
-    if (body.shape->parts.empty()) {
-      body.warnings = warnings_about(body, spacing);
-      body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
-          MeshWallType::template of<Kernel>(*body.surface, smoothing_length, spacing, threads));
-    } else {
-      body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
-          SolidParts::of<Kernel>(body.shape->parts, smoothing_length, spacing));
-    }
     body.motion = std::move(motion);
     body.slip = slip;
-    body.bounds = body.surface->bounds();
+    give_shape<Kernel>(body, std::move(shape), smoothing_length, spacing, threads);
     bodies_.push_back(std::move(body));
     return static_cast<BodyId>(bodies_.size() - 1);
+  }
+
+  /// Gives a body another shape; all else of it stays. Takes and throws what add does.
+  template <class Kernel>
+  void replace_shape(BodyId body, BodyShape shape, double smoothing_length, double spacing, Threads threads) {
+    Body other = bodies_[body];
+    give_shape<Kernel>(other, std::move(shape), smoothing_length, spacing, threads);
+    bodies_[body] = std::move(other);
   }
 
   std::size_t size() const noexcept { return bodies_.size(); }
@@ -241,6 +237,24 @@ class RigidBodies {
   }
 
  private:
+  template <class Kernel>
+  void give_shape(Body& body, BodyShape shape, double smoothing_length, double spacing, Threads threads) {
+    half_space_ = HalfSpace::of<Kernel>(smoothing_length);
+    reach_ = WallFunction::of<Kernel>(smoothing_length, spacing).reach();
+    body.shape = std::make_shared<const BodyShape>(std::move(shape));
+    body.surface = std::make_shared<const BoundingVolumeHierarchy>(body.shape->mesh);
+    body.warnings.clear();
+    if (body.shape->parts.empty()) {
+      body.warnings = warnings_about(body, spacing);
+      body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
+          MeshWallType::template of<Kernel>(*body.surface, smoothing_length, spacing, threads));
+    } else {
+      body.wall = std::make_shared<const std::variant<MeshWallType, SolidParts>>(
+          SolidParts::of<Kernel>(body.shape->parts, smoothing_length, spacing));
+    }
+    body.bounds = body.surface->bounds();
+  }
+
   enum class Outcome { Free, Slid, Stopped, Lost };
 
   /// A body's share of one particle's support, in the world frame.

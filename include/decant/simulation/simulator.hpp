@@ -91,6 +91,22 @@ class Simulator {
     return body;
   }
 
+  /// Gives a body another shape where it is, as add_body does: for hypotheses that differ in one body, copies of a
+  /// simulator share the walls of all others. Liquid that is in its material is pushed out. A container that was
+  /// watched is so no longer.
+  void replace_shape(BodyId body, BodyShape shape) requires requires(Bodies& bodies, Threads threads) {
+    bodies.template replace_shape<Kernel>(body, std::move(shape), 1.0, 1.0, threads);
+  }
+  {
+    expects(body < bodies_.size(), "Simulator: body", "one that was added", body);
+    bodies_.template replace_shape<Kernel>(body, std::move(shape), smoothing_length_, settings_.spacing,
+                                           settings_.threads);
+    std::erase_if(watched_, [&](const Watched& watched) { return watched.first == body; });
+    remembered_walls_.forget();
+    bodies_.set_interval(time_, 0);
+    bodies_.push_out(body, 0.5 * settings_.spacing, fluid_);
+  }
+
   /// Looks a body's surface over as the body stands now, against gravity: its flaws in numbers and in words, and what
   /// fits below its rim. Takes some tenths of a second for a scan.
   MeshReport mesh_report(BodyId body) const {
