@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // Which viscosity (and surface tension) a liquid has, by recordings of how it was poured:
 //   fit_liquid --learn DIR... --held-out DIR... --parameters viscosity --json OUT.json --report OUT.html
+//   mpirun -n 8 fit_liquid_mpi --learn DIR...      where MPI is installed: the same, by processes on one machine or
+//   many
 // Exit status 0: done; 1: no run could be followed to its end; 2: a recording, a file or an argument is wrong.
 
 #include <algorithm>
@@ -28,6 +30,7 @@
 
 #include "support/liquid_fit.hpp"
 #include "support/result_file.hpp"
+#include "support/sweep_executor.hpp"
 #include "support/tool.hpp"
 
 namespace {
@@ -127,6 +130,7 @@ void expect_apart(const std::vector<std::string>& learn, const std::vector<std::
 }  // namespace
 
 int main(int count, char** values) {
+  const example::SweepSession session;
   std::string json_file, report_file, journal_file, method = "surrogate";
   std::vector<std::string> learn_folders, held_out_folders;
   example::LiquidFitOptions options;
@@ -151,12 +155,14 @@ int main(int count, char** values) {
   app.add_option("--json", json_file, "writes parameters, evaluations and scores");
   app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
-  app.add_option("--threads", threads, "runs side by side, each on one thread; 0: one per core")
+  app.add_option("--threads", threads,
+                 "runs side by side, each on one thread, by MPI in each process; 0: one per core, by MPI one")
       ->check(CLI::Range(0, 1024));
   return example::run_tool(app, count, values, [&] {
     options.best_first = method != "surrogate";
     options.surrogate = method != "best_first";
-    example::expect_writable({json_file, report_file});
+    example::SweepExecutor executor = example::sweep_executor(threads);
+    example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
     expect_apart(learn_folders, held_out_folders);
     const std::vector<decant::ParameterAxis> axes = example::axes_of(options.parameters);
     tracking.spacing = 1e-3 * spacing_mm;
@@ -177,10 +183,9 @@ int main(int count, char** values) {
       ++runs;
       progress.update(runs, number_text(runs) + " runs, at most " + number_text(at_most));
     };
-    decant::ThreadExecutor executor{{threads}};
     std::optional<decant::Journal> journal;
     if (!journal_file.empty()) {
-      journal.emplace(journal_file, std::string("fit_liquid of decant ") + DECANT_VERSION);
+      journal.emplace(executor, journal_file, std::string("fit_liquid of decant ") + DECANT_VERSION);
     }
     decant::Journal* kept = journal ? &*journal : nullptr;
     example::LiquidFit fit;
@@ -195,15 +200,17 @@ int main(int count, char** values) {
       std::printf("%s\n", example::sentence(fit.axes[axis], fit.search().parameters[axis]).c_str());
     }
     std::printf("%s%s", parameters_table(fit).text().c_str(), gain_table(fit).text().c_str());
-    if (!json_file.empty()) {
-      nlohmann::json json = example::liquid_fit_json(fit);
-      json["seconds"] = 1e-3 * milliseconds;
-      json["spacing_mm"] = spacing_mm;
-      example::write_result(json_file, json);
-    }
-    if (!report_file.empty()) {
-      write_report(report_file, fit);
-    }
+    example::in_first_process(executor, [&] {
+      if (!json_file.empty()) {
+        nlohmann::json json = example::liquid_fit_json(fit);
+        json["seconds"] = 1e-3 * milliseconds;
+        json["spacing_mm"] = spacing_mm;
+        example::write_result(json_file, json);
+      }
+      if (!report_file.empty()) {
+        write_report(report_file, fit);
+      }
+    });
     return fit.works() ? 0 : 1;
   });
 }

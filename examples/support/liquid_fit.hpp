@@ -19,16 +19,15 @@
 #include <decant/core/expects.hpp>
 #include <decant/hypothesis/best_first_search.hpp>
 #include <decant/hypothesis/evaluation.hpp>
-#include <decant/hypothesis/executor.hpp>
 #include <decant/hypothesis/parameter_axis.hpp>
 #include <decant/hypothesis/parameter_estimate.hpp>
 #include <decant/hypothesis/surrogate_search.hpp>
-#include <decant/hypothesis/thread_executor.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/journal.hpp>
 
 #include "liquid_run.hpp"
 #include "result_file.hpp"
+#include "sweep_executor.hpp"
 
 namespace example {
 
@@ -38,9 +37,9 @@ class LiquidRuns {
   using Point = std::vector<double>;
 
   /// @param executor must live as long, and so must journal, where there is one: it has what ran before.
-  /// @param told is told each run as it ends.
-  LiquidRuns(std::vector<LiquidRecording> recordings, std::vector<decant::ParameterAxis> axes,
-             decant::ThreadExecutor& executor, decant::Journal* journal, std::function<void()> told)
+  /// @param told is told each run as it ends, in the first process.
+  LiquidRuns(std::vector<LiquidRecording> recordings, std::vector<decant::ParameterAxis> axes, SweepExecutor& executor,
+             decant::Journal* journal, std::function<void()> told)
       : recordings_(std::move(recordings)),
         axes_(std::move(axes)),
         executor_(&executor),
@@ -113,7 +112,7 @@ class LiquidRuns {
 
   std::vector<LiquidRecording> recordings_;
   std::vector<decant::ParameterAxis> axes_;
-  decant::ThreadExecutor* executor_;
+  SweepExecutor* executor_;
   decant::Journal* journal_;
   std::function<void()> told_;
   std::map<Point, decant::JobResult> known_{};
