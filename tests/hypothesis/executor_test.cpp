@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "catch.hpp"
@@ -33,6 +35,8 @@ TEST_CASE("A job that throws ends the run with what it threw") {
       if (k == 3) {
         throw std::out_of_range("job 3");
       }
+      // else the other thread is through with all of them while this one waits for its core
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
       return {};
     };
     CHECK_THROWS_AS(executor.run(1000, work, decant::tell_nobody), std::out_of_range);
