@@ -107,6 +107,8 @@ void write_report(const std::string& file, const decant::Recording& recording, c
                                          return blocked == 0 || (blocked == 1 && example::blocks(result, k, leg));
                                        }));
   }
+  report.chart(example::course_chart("Openings of two legs at once [%]", result.course, "",
+                                     [&](std::size_t k) { return example::blocked_legs(result, k) > 1; }));
   report.chart(example::followed_chart({{"legs and openings", &result.course}}));
   const double all =
       static_cast<double>(std::max<std::size_t>(1, result.course.names.size() * result.course.time.size()));

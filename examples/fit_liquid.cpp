@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which viscosity (and surface tension) a liquid has, by recordings of how it was poured:
 //   fit_liquid --learn DIR... --held-out DIR... --parameters viscosity --json OUT.json --report OUT.html
-//   mpirun -n 8 fit_liquid_mpi --learn DIR...      where MPI is installed: the same, by processes on one machine or
-//   many
+//   mpirun -n 8 fit_liquid_mpi --learn DIR...      the same on many machines, where MPI is installed
 // Exit status 0: done; 1: no run could be followed to its end; 2: a recording, a file or an argument is wrong.
 
 #include <algorithm>

@@ -21,6 +21,7 @@
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/pipe_blockage.hpp>
 #include <decant/boundary/pipe_openings.hpp>
+#include <decant/hypothesis/marginal.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/io/recording.hpp>
 
@@ -132,21 +133,20 @@ inline bool blocks(const BlockageResult& result, std::size_t hypothesis, std::si
 /// A leg's opening after a frame, whatever the other legs' are. Nothing where every hypothesis has failed.
 inline std::optional<decant::ValueDensity> opening_density(const BlockageResult& result, std::size_t leg,
                                                            std::size_t frame) {
-  const std::vector<double> log_posterior = result.course.log_posterior_at(frame);
-  std::map<double, std::vector<double>> of_opening;
+  std::vector<double> of_hypothesis;
   std::map<double, double> log_prior;  // where the other legs are open: all openings of this one are as probable
-  for (std::size_t k = 0; k < log_posterior.size(); ++k) {
-    const double opening = result.opening[k][leg];
-    of_opening[opening].push_back(log_posterior[k]);
-    if (blocked_legs(result, k) == (opening < 1 ? 1 : 0)) {
-      log_prior[opening] = result.log_prior[k];
+  for (std::size_t k = 0; k < result.opening.size(); ++k) {
+    of_hypothesis.push_back(result.opening[k][leg]);
+    if (blocked_legs(result, k) == (blocks(result, k, leg) ? 1 : 0)) {
+      log_prior[of_hypothesis.back()] = result.log_prior[k];
     }
   }
+  const decant::Marginal marginal = decant::marginal(of_hypothesis, result.course.log_posterior_at(frame));
   std::vector<double> opening, log_density;
-  for (const auto& [value, logs] : of_opening) {
-    if (log_prior.contains(value)) {
-      opening.push_back(value);
-      log_density.push_back(log_of_sum(logs) - log_prior[value]);
+  for (std::size_t n = 0; n < marginal.values.size(); ++n) {
+    if (const auto prior = log_prior.find(marginal.values[n]); prior != log_prior.end()) {
+      opening.push_back(prior->first);
+      log_density.push_back(marginal.log_density[n] - prior->second);
     }
   }
   if (std::none_of(log_density.begin(), log_density.end(), [](double each) { return std::isfinite(each); })) {
@@ -255,6 +255,9 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
   for (std::size_t k = 0; k < options.openings.size(); ++k) {
     expects(options.openings[k] > (k > 0 ? options.openings[k - 1] : 0.0) && options.openings[k] < 1,
             "find_blockage: openings", "increasing, between 0 and 1", options.openings[k]);
+  }
+  for (const double opening : options.openings_of_two) {
+    expects(opening >= 0 && opening < 1, "find_blockage: openings_of_two", "in [0, 1)", opening);
   }
   expects(options.particles_across > 0, "find_blockage: particles_across", "> 0", options.particles_across);
   BlockageResult result;

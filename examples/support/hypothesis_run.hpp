@@ -30,20 +30,6 @@
 
 namespace example {
 
-/// Log of the sum of exponentials; -infinity for none.
-inline double log_of_sum(const std::vector<double>& logs) {
-  const double largest =
-      logs.empty() ? -std::numeric_limits<double>::infinity() : *std::max_element(logs.begin(), logs.end());
-  if (!std::isfinite(largest)) {
-    return largest;
-  }
-  double sum = 0;
-  for (const double each : logs) {
-    sum += std::exp(each - largest);
-  }
-  return largest + std::log(sum);
-}
-
 /// Something that may be so, and the model as it starts if it is.
 struct NamedModel {
   std::string name;
@@ -156,7 +142,7 @@ inline std::vector<double> probability_schenck2017(const PosteriorCourse& course
 /// Shares are of all liquid that there is.
 struct RelocationEvidence {
   double independent_errors = 20;  ///< see decant::PosteriorSettings
-  double usual_share = 0.02;       ///< right hypotheses need no more (0.3 to 0.6 % where a pipe branches)
+  double usual_share = 0.02;       ///< right hypotheses need no more: 0.3 to 1.8 % where a pipe branches
   double hopeless_share = 0.04;    ///< twice that: beyond it "none of these" is more probable
 };
 

@@ -151,7 +151,7 @@ inline ExperimentSection every_junction(const std::vector<JunctionScore>& scores
   ExperimentSection section{"One by one, default method",
                             decant::Table({"recording", "solver", "hidden", "answer", "right", "truth [%]",
                                            "decided [s]", "a third is out [s]"})};
-  std::size_t hypotheses = 0, frames = 0, run = 0;
+  std::size_t hypotheses = 0, frames = 0, run = 0, coarse = 0;
   for (const JunctionScore& each : scores) {
     section.table.add({each.of->name, each.solver(), each.hidden(),
                        answer_text(each.result->at("answer").get<std::string>()), each.right() ? "yes" : "NO",
@@ -160,11 +160,14 @@ inline ExperimentSection every_junction(const std::vector<JunctionScore>& scores
     hypotheses = each.result->at("hypotheses").size();
     frames += hypotheses * each.result->at("posterior_over_time").at("time_s").size();
     run += each.result->at("frames_run").get<std::size_t>();
+    coarse += each.result->at("scouted_frames_run").get<std::size_t>();
   }
-  const double saved = frames > 0 ? 1 - static_cast<double>(run) / static_cast<double>(frames) : 0;
-  section.json = {{"frames_saved", saved}, {"hypotheses", hypotheses}};
-  section.note = "Giving up hopeless hypotheses saved " + percent_text(saved, 0) + " % of the frames of " +
-                 std::to_string(hypotheses) + " hypotheses.";
+  const auto share = [&](std::size_t part) {
+    return frames > 0 ? static_cast<double>(part) / static_cast<double>(frames) : 0.0;
+  };
+  section.json = {{"frames_share", share(run)}, {"coarse_frames_share", share(coarse)}, {"hypotheses", hypotheses}};
+  section.note = "Of the frames of " + std::to_string(hypotheses) + " hypotheses " + percent_text(share(run), 0) +
+                 " % were simulated, after " + percent_text(share(coarse), 0) + " % in coarse particles.";
   return section;
 }
 

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <decant/core/log_sum.hpp>
 #include <decant/io/recording.hpp>
 
 #include "hypothesis_run.hpp"
@@ -48,6 +49,14 @@ inline std::vector<NamedModel> models_of(const HypothesisSet& set, const std::ve
     models.push_back({set.names[k], set.model(k, spacing), set.log_prior[k]});
   }
   return models;
+}
+
+inline double log_sum_of(const std::vector<double>& logs) {
+  double sum = -std::numeric_limits<double>::infinity();
+  for (const double each : logs) {
+    sum = decant::log_sum(sum, each);
+  }
+  return sum;
 }
 
 inline double highest_of(const PosteriorCourse& course, const std::vector<std::size_t>& chosen, std::size_t frame) {
@@ -108,8 +117,9 @@ inline PosteriorCourse joined_courses(PosteriorCourse fine, const std::vector<st
   }
   // "none of these" has its share of all hypotheses, of which the fine run had some
   course.log_none = std::move(fine.log_none);
+  const double all = detail::log_sum_of(log_prior), followed = detail::log_sum_of(chosen_priors);
   for (double& log_none : course.log_none) {
-    log_none += log_of_sum(log_prior) - log_of_sum(chosen_priors);
+    log_none += all - followed;
   }
   return course;
 }

@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdio>
-#include <string>
 
 #include <decant/hypothesis/executor.hpp>
 

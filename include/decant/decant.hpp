@@ -43,6 +43,7 @@
 #include <decant/core/fluid_state.hpp>
 #include <decant/core/growable.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/log_sum.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/pose.hpp>

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/log_sum.hpp>
 #include <decant/core/target.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -35,13 +36,12 @@ inline Marginal marginal(std::span<const double> value, std::span<const double> 
     expects(std::isfinite(value[k]), "marginal: value", "finite", value[k]);
     expects(!std::isnan(log_posterior[k]), "marginal: log posterior", "a number", log_posterior[k]);
     double& sum = log_sums.try_emplace(value[k], never).first->second;
-    const double larger = std::max(sum, log_posterior[k]), smaller = std::min(sum, log_posterior[k]);
-    sum = larger == never ? never : larger + std::log1p(std::exp(smaller - larger));
+    sum = log_sum(sum, log_posterior[k]);
   }
   Marginal result;
-  for (const auto& [of, log_sum] : log_sums) {
+  for (const auto& [of, sum] : log_sums) {
     result.values.push_back(of);
-    result.log_density.push_back(log_sum);
+    result.log_density.push_back(sum);
   }
   return result;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <decant/core/expects.hpp>
+#include <decant/core/log_sum.hpp>
 #include <decant/core/target.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -158,10 +159,10 @@ class Posterior {
       double hidden = one.log_prior, shown = nothing;
       for (const auto& [source, here] : hopeless) {
         const double not_here = one.excluded ? nothing : log_likelihood(one.misfits[source].squared, source);
-        shown = log_of_sum(shown + log_of_sum(here, not_here), hidden + here);
+        shown = log_sum(shown + log_sum(here, not_here), hidden + here);
         hidden += not_here;
       }
-      sum = log_of_sum(sum, hopeless.empty() ? hidden : shown);
+      sum = log_sum(sum, hopeless.empty() ? hidden : shown);
     }
     if (!hopeless.empty()) {
       sum -= std::log(std::exp2(static_cast<double>(hopeless.size())) - 1);  // all sets of sources but the empty one
@@ -171,12 +172,12 @@ class Posterior {
 
   double probability(std::size_t hypothesis) const {
     const double own = log_posterior(hypothesis);
-    return std::isfinite(own) ? std::exp(own - log_sum()) : 0;
+    return std::isfinite(own) ? std::exp(own - log_of_all()) : 0;
   }
   /// 1 if all hypotheses are excluded, and "none of these" was allowed at all.
   double probability_of_none() const noexcept {
     const double own = log_posterior_of_none();
-    return std::isfinite(own) ? std::exp(own - log_sum()) : 0;
+    return std::isfinite(own) ? std::exp(own - log_of_all()) : 0;
   }
 
   /// The most probable one; of equals the first. "None of these" does not count.
@@ -216,20 +217,12 @@ class Posterior {
     }
     return count > 0 ? total / static_cast<double>(count) : measured;
   }
-  static double log_of_sum(double a, double b) noexcept {
-    const double larger = std::max(a, b);
-    return std::isfinite(larger) ? larger + std::log1p(std::exp(std::min(a, b) - larger)) : larger;
-  }
-  double log_sum() const noexcept {
-    double largest = log_posterior_of_none();
+  double log_of_all() const noexcept {
+    double sum = log_posterior_of_none();
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-      largest = std::max(largest, log_posterior(k));
+      sum = log_sum(sum, log_posterior(k));
     }
-    double total = std::exp(log_posterior_of_none() - largest);
-    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-      total += std::exp(log_posterior(k) - largest);
-    }
-    return largest + std::log(total);
+    return sum;
   }
 
   Settings settings_;
