@@ -141,7 +141,7 @@ inline std::vector<double> probability_schenck2017(const PosteriorCourse& course
 /// little of that, whereas liquid that comes out where no hypothesis lets it has to be taken there again and again.
 /// Shares are of all liquid that there is.
 struct RelocationEvidence {
-  double independent_errors = 20;  ///< see decant::PosteriorSettings
+  double independent_errors = 20;  ///< in all, see decant::PosteriorSettings; fewer while little was seen
   double usual_share = 0.02;       ///< right hypotheses need no more: 0.3 to 1.8 % where a pipe branches
   double hopeless_share = 0.04;    ///< twice that: beyond it "none of these" is more probable
 };
@@ -198,8 +198,10 @@ PosteriorCourse weigh(const decant::Recording& recording, const std::vector<Name
     }
     const double most = hypotheses.empty() ? 0 : *std::max_element(volume.begin(), volume.end());
     if (settings.relocation && most > 0) {
-      filter.set_source(relocation, {settings.relocation->independent_errors, settings.relocation->usual_share * most,
-                                     settings.relocation->hopeless_share});
+      const double share_shown =
+          settings.filter.errors_after(filter.seen_seconds()) / settings.filter.posterior.independent_errors;
+      filter.set_source(relocation, {settings.relocation->independent_errors * share_shown,
+                                     settings.relocation->usual_share * most, settings.relocation->hopeless_share});
     }
     for (std::size_t k = 0; k < hypotheses.size(); ++k) {
       course.log_posterior[k].push_back(filter.log_posterior(k));

@@ -37,6 +37,7 @@ template <class CorrectorType>
 HypothesisFilter<DustTracker<CorrectorType>> after(int frames, HypothesisFilterSettings settings = {},
                                                    ThreadExecutor executor = {}) {
   settings.posterior.least_squared = 0.5;  // dust is thin, and its model right to the last bit
+  settings.error_correlation_time = 0;     // and few frames are enough
   HypothesisFilter<DustTracker<CorrectorType>> filter(settings, executor);
   for (int gravity = 0; gravity <= 4; ++gravity) {
     filter.add(falling_with<CorrectorType>(-gravity));
@@ -153,6 +154,39 @@ TEST_CASE("hypothesis filter: before anything is seen there is the prior, and fr
   CHECK(filter.track({0.2, {}, wrong}).status == FrameStatus::BadInput);
   CHECK(filter.probability(0) == Approx(0.75));
   CHECK(filter.running() == 2);
+}
+
+TEST_CASE("hypothesis filter: what is seen for longer says more, up to what a model errs in all") {
+  HypothesisFilterSettings settings;
+  settings.least_probability = 0;
+  settings.posterior.none_prior = 0;
+  settings.error_correlation_time = 0.04;
+  const auto errors_after = [&](int dark_frames, int frames) {
+    HypothesisFilter<DustTracker<OpenLoop<double>>> filter(settings);
+    filter.add(falling_with<OpenLoop<double>>(-1));
+    filter.add(falling_with<OpenLoop<double>>(-2));
+    FallingDust reality = falling_with<OpenLoop<double>>(-2).model();
+    for (int frame = 1; frame <= dark_frames + frames; ++frame) {
+      reality.step(1 / 60.0);
+      const Mask mask = decant_test::seen(reality.dust);
+      const std::vector<CameraMask> masks{{0, mask}}, none;
+      REQUIRE(filter.track({frame / 60.0, {}, frame > dark_frames ? masks : none}).advanced());
+    }
+    CHECK(filter.seen_seconds() == Approx((frames - (dark_frames == 0 ? 1 : 0)) / 60.0));
+    // the odds are what that many errors make of misfits so far
+    const double n = filter.posterior().source(0).independent_errors, least = settings.posterior.least_squared;
+    CHECK(filter.log_posterior(1) - filter.log_posterior(0) ==
+          Approx(0.5 * n * std::log((least + filter.posterior().misfit(0).squared) /
+                                    (least + filter.posterior().misfit(1).squared))));
+    return n;
+  };
+  CHECK(errors_after(0, 1) == Approx(1));  // for how long the first frame's liquid was there is not known
+  CHECK(errors_after(0, 13) == Approx(1 + 12 / 60.0 / 0.04));
+  CHECK(errors_after(7, 6) == Approx(1 + 6 / 60.0 / 0.04));  // before that nobody looked
+  settings.posterior.independent_errors = 4;
+  CHECK(errors_after(0, 13) == 4);
+  settings.error_correlation_time = 0;
+  CHECK(errors_after(0, 1) == 4);
 }
 
 TEST_CASE("hypothesis filter: one whose model fails is given up, but not the last") {
@@ -293,6 +327,9 @@ TEST_CASE("hypothesis filter: settings are checked") {
   settings = {};
   settings.least_probability = 1;
   CHECK_THROWS_WITH(Filter(settings), decant_test::contains("in [0, 1)"));
+  settings = {};
+  settings.error_correlation_time = -0.1;
+  CHECK_THROWS_WITH(Filter(settings), decant_test::contains("error_correlation_time must be >= 0"));
   Filter filter;
   CHECK(filter.add([] { return falling_with<OpenLoop<double>>(0); }) == 0);
   CHECK(filter.has_tracker(0));

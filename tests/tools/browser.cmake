@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Opens REPORT, a page with a film, in Chromium without a window of its own, and uses it as a reader would (browser.js).
+# Opens REPORT, a page with a film unless FILM=no, in Chromium without a window of its own, and uses it as a reader would
+# (browser.js).
 # BROKEN=yes takes the slider's connection out of the page's script first, and expects that this is noticed.
 cmake_minimum_required(VERSION 3.22)
 
@@ -10,6 +11,11 @@ endif()
 if(NOT browser OR NOT status EQUAL 0)
   message(STATUS "skipped: no Chromium to open ${REPORT} with")
   return()
+endif()
+
+set(place_in_film "#film=0&picture=1")
+if(DEFINED FILM AND NOT FILM)
+  set(place_in_film "")
 endif()
 
 file(REMOVE_RECURSE "${SCRATCH}")
@@ -44,7 +50,7 @@ file(WRITE "${SCRATCH}/page.html" "${page}<script>${test}</script>")
 execute_process(
   COMMAND "${browser}" --headless --no-sandbox --disable-gpu --disable-dev-shm-usage --no-first-run
           --user-data-dir=${SCRATCH}/profile --window-size=${WINDOW} --virtual-time-budget=20000 --dump-dom
-          "file://${SCRATCH}/page.html#film=0&picture=1"
+          "file://${SCRATCH}/page.html${place_in_film}"
   TIMEOUT 120 RESULT_VARIABLE status OUTPUT_VARIABLE dump ERROR_VARIABLE errors)
 # a browser without a desktop complains of that at length
 string(REGEX REPLACE "[^\n]*/dbus/[^\n]*\n" "" errors "${errors}")

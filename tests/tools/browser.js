@@ -11,26 +11,11 @@
     for (let k = 0; k < 50 && !image.complete; ++k) await wait(20);
     return image.complete && image.naturalWidth > 1;
   };
-  try {
-    const film = one('#film'), scrub = one('#scrub'), label = one('#time'), choice = one('#choice'), play = one('#play');
+  const use_film = async (film, charts) => {
+    const scrub = one('#scrub'), label = one('#time'), choice = one('#choice'), play = one('#play');
     const cursor = () => [...document.querySelectorAll('.chart .now')].map(line => line.getAttribute('x1')).join();
     const shown = () => ({image: film.src, text: label.textContent, cursor: cursor(), place: Number(scrub.value)});
     const last = Number(scrub.max);
-
-    expect('a table with cells', document.querySelectorAll('td').length > 3);
-    const charts = [...document.querySelectorAll('.chart')].filter(chart => chart.getBoundingClientRect().width > 0);
-    expect('charts that are visible', charts.length > 0);
-    for (const chart of charts) {
-      const lines = [...chart.querySelectorAll('path.line')];
-      expect('lines in "' + chart.getAttribute('aria-label') + '"', lines.some(line => line.getTotalLength() > 50));
-      const box = chart.getBoundingClientRect();
-      expect('a chart no wider than the page', box.left >= 0 && box.right <= document.documentElement.clientWidth);
-      expect('letters that can be read', parseFloat(getComputedStyle(chart).fontSize) * box.width /
-                                             chart.viewBox.baseVal.width > 9);
-    }
-    expect('a page that need not be pushed sideways',
-           document.documentElement.scrollWidth <= document.documentElement.clientWidth);
-    for (const image of document.images) expect('pixels in each picture', await loaded(image));
 
     // the address asked for the second picture
     expect('the picture of the address', shown().place === 1);
@@ -85,6 +70,29 @@
       expect('the film of the link', choice.selectedIndex === Number(wish.get('film')) &&
              shown().place === Number(wish.get('picture')));
     }
+  };
+  try {
+    expect('a table with cells', document.querySelectorAll('td').length > 3);
+    const charts = [...document.querySelectorAll('.chart')].filter(chart => chart.getBoundingClientRect().width > 0);
+    expect('charts that are visible', charts.length > 0);
+    for (const chart of charts) {
+      const lines = [...chart.querySelectorAll('path.line')];
+      const bars = [...chart.querySelectorAll('rect[fill]')];
+      expect('lines or bars in "' + chart.getAttribute('aria-label') + '"',
+             lines.some(line => line.getTotalLength() > 50) || bars.some(bar => bar.height.baseVal.value > 20));
+      const box = chart.getBoundingClientRect();
+      expect('a chart no wider than the page', box.left >= 0 && box.right <= document.documentElement.clientWidth);
+      expect('letters that can be read', parseFloat(getComputedStyle(chart).fontSize) * box.width /
+                                             chart.viewBox.baseVal.width > 9);
+    }
+    expect('a page that need not be pushed sideways',
+           document.documentElement.scrollWidth <= document.documentElement.clientWidth);
+    for (const image of document.images) expect('pixels in each picture', await loaded(image));
+
+    // the address says whether there is a film to see
+    const film = one('#film');
+    expect('a film if there is one to see', Boolean(film) === location.hash.includes('film='));
+    if (film) await use_film(film, charts);
   } catch (error) {
     problems.push(String(error.stack || error));
   }

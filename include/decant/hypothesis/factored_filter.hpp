@@ -16,6 +16,7 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
+#include <decant/core/log_sum.hpp>
 #include <decant/core/target.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/hypothesis/hypothesis_filter.hpp>
@@ -96,11 +97,14 @@ class FactoredFilter {
   /// stands; then one that is in no combination that is probable enough. Never throws; allocates where a tracker does.
   /// @return Ok if a mask was believed in some group; ModelFailed if no simulation of some group stands.
   [[nodiscard]] FrameStatus track(const TrackerFrame& frame) noexcept {
+    const double before = something();
     const FrameReport report = filter_.track(frame);
     if (!report.advanced()) {
       return report.status;  // all trackers refuse a frame alike
     }
     look_outside(frame);
+    seen_seconds_ += something() > before ? frame.time - last_time_.value_or(frame.time) : 0.0;
+    last_time_ = frame.time;
     judge();
     prune();
     bool seen = false;
@@ -132,20 +136,16 @@ class FactoredFilter {
 
   /// Of one source's hypothesis, whatever is so of the other sources.
   double probability(std::size_t source, std::size_t hypothesis) const {
-    const double own = log_sum(source, hypothesis, [this](std::size_t c) { return joint_.log_posterior(c); });
-    double largest = joint_.log_posterior_of_none();
+    const double own = log_marginal(source, hypothesis, [this](std::size_t c) { return joint_.log_posterior(c); });
+    double all = joint_.log_posterior_of_none();
     for (std::size_t c = 0; c < combinations_; ++c) {
-      largest = std::max(largest, joint_.log_posterior(c));
+      all = log_sum(all, joint_.log_posterior(c));
     }
-    double total = std::exp(joint_.log_posterior_of_none() - largest);
-    for (std::size_t c = 0; c < combinations_; ++c) {
-      total += std::exp(joint_.log_posterior(c) - largest);
-    }
-    return std::isfinite(own) ? std::exp(own - largest) / total : 0;
+    return std::isfinite(own) ? std::exp(own - all) : 0;
   }
   /// The same as a logarithm up to a constant that all share, also of hypotheses that were given up: for ValueDensity.
   double log_posterior(std::size_t source, std::size_t hypothesis) const {
-    return log_sum(source, hypothesis, [this](std::size_t c) { return log_posterior_of(c); });
+    return log_marginal(source, hypothesis, [this](std::size_t c) { return log_posterior_of(c); });
   }
 
   /// The most probable combination; of equals the first. "None of these" does not count.
@@ -247,22 +247,16 @@ class FactoredFilter {
   }
 
   template <class LogOf>
-  double log_sum(std::size_t source, std::size_t hypothesis, LogOf&& log_of) const {
+  double log_marginal(std::size_t source, std::size_t hypothesis, LogOf&& log_of) const {
     expects(source < log_prior_.size(), "FactoredFilter: source", "one that has hypotheses", source);
     expects(hypothesis < log_prior_[source].size(), "FactoredFilter: hypothesis", "one of the source's", hypothesis);
-    double largest = -std::numeric_limits<double>::infinity();
-    std::vector<double> logs;
+    double sum = -std::numeric_limits<double>::infinity();
     for_each_combination([&](std::size_t c, const Choice& choice) {
       if (choice[source] == hypothesis) {
-        logs.push_back(log_of(c));
-        largest = std::max(largest, logs.back());
+        sum = log_sum(sum, log_of(c));
       }
     });
-    double total = 0;
-    for (const double each : logs) {
-      total += std::isfinite(largest) ? std::exp(each - largest) : 0;
-    }
-    return largest + std::log(total);
+    return sum;
   }
 
   // What is seen where no group's liquid can be is off by all of it in every combination.
@@ -287,8 +281,20 @@ class FactoredFilter {
     }
   }
 
+  // What grows with each frame in which there was liquid to see or to predict, in a group or outside of all.
+  double something() const noexcept {
+    double sum = outside_.measured;
+    for (std::size_t k = 0; k < filter_.size(); ++k) {
+      const Misfit& misfit = filter_.posterior().misfit(k);
+      const double here = misfit.squared + misfit.measured;
+      sum += std::isfinite(here) ? here : 0.0;
+    }
+    return sum;
+  }
+
   void judge() {
     joint_ = Posterior(settings_.posterior);
+    joint_.set_source(0, settings_.evidence_after(seen_seconds_));
     for_each_combination([&](std::size_t c, const Choice& choice) {
       double prior = 0;
       for (std::size_t source = 0; source < choice.size(); ++source) {
@@ -352,6 +358,8 @@ class FactoredFilter {
   std::vector<MaskTrust> trust_{};  // by camera, of the whole mask
   Mask clean_{};
   Misfit outside_{};
+  std::optional<double> last_time_{};
+  double seen_seconds_ = 0;
 };
 
 }  // namespace decant::inline DECANT_TARGET

@@ -32,7 +32,22 @@ namespace decant::inline DECANT_TARGET {
 struct HypothesisFilterSettings {
   int cell_px = 20;  ///< see SilhouetteCells, >= 1; misfits are counted in cells
   PosteriorSettings posterior{};
+  /// For how long an error of the model stays one and the same [s], >= 0: a stream that hits the pan too late does so
+  /// in the next frame too. What has been seen for a time t says as much as 1 + t / error_correlation_time independent
+  /// errors, and no more than posterior.independent_errors, since some errors never end. 0: as much as these from the
+  /// first frame on, which makes the posterior too sure while little has been seen.
+  double error_correlation_time = 0.05;
   double least_probability = 1e-6;  ///< hypotheses below this share of the best one's are given up, in [0, 1); 0: none
+
+  /// How many independent errors a model has made in the time for which there was liquid to see or to predict.
+  double errors_after(double seen_seconds) const noexcept {
+    const double most = posterior.independent_errors;
+    return error_correlation_time > 0 ? std::min(most, 1 + seen_seconds / error_correlation_time) : most;
+  }
+  /// And what the masks' misfits are worth then.
+  EvidenceSettings evidence_after(double seen_seconds) const noexcept {
+    return {errors_after(seen_seconds), posterior.least_squared, posterior.hopeless_share};
+  }
 };
 
 namespace detail {
@@ -110,6 +125,9 @@ class HypothesisFilter {
       : settings_(settings), cells_(settings.cell_px), posterior_(settings.posterior), executor_(std::move(executor)) {
     expects(settings.least_probability >= 0 && settings.least_probability < 1, "HypothesisFilter: least_probability",
             "in [0, 1)", settings.least_probability);
+    expects(settings.error_correlation_time >= 0 && std::isfinite(settings.error_correlation_time),
+            "HypothesisFilter: error_correlation_time", ">= 0", settings.error_correlation_time);
+    posterior_.set_source(0, settings_.evidence_after(0));
   }
 
   /// Adds a source of evidence beside the masks, such as a scale (see series_misfit.hpp); before hypotheses. Throws as
@@ -164,11 +182,20 @@ class HypothesisFilter {
           return detail::numbers_of({hypothesis.last.report, misfit_of(frame, hypothesis)});
         },
         tell_nobody);
+    bool advanced = false, seen = false;
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
       if (!hypotheses_[k].given_up) {
         hypotheses_[k].last = detail::frame_of(frames[k]);
-        posterior_.observe(k, hypotheses_[k].last.misfit);
+        const Misfit& misfit = hypotheses_[k].last.misfit;
+        posterior_.observe(k, misfit);
+        advanced = advanced || hypotheses_[k].last.report.advanced();
+        seen = seen || misfit.measured > 0 || misfit.squared > 0;
       }
+    }
+    if (advanced) {
+      seen_seconds_ += seen ? frame.time - last_time_.value_or(frame.time) : 0.0;
+      last_time_ = frame.time;
+      posterior_.set_source(0, settings_.evidence_after(seen_seconds_));
     }
     give_up();
     return hypotheses_[given_up(before) && !hypotheses_[before].last.report.advanced() ? best() : before].last.report;
@@ -212,6 +239,8 @@ class HypothesisFilter {
   /// The most probable one; of equals the first. "None of these" does not count.
   std::size_t best() const noexcept { return posterior_.best(); }
 
+  /// For how long there was liquid to see, or some hypothesis predicted some [s].
+  double seen_seconds() const noexcept { return seen_seconds_; }
   /// Misfits so far, and what they are worth.
   const Posterior& posterior() const noexcept { return posterior_; }
 
@@ -313,6 +342,8 @@ class HypothesisFilter {
   Posterior posterior_;
   ExecutorType executor_;
   std::vector<Hypothesis> hypotheses_{};
+  std::optional<double> last_time_{};
+  double seen_seconds_ = 0;
 };
 
 }  // namespace decant::inline DECANT_TARGET

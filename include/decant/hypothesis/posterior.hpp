@@ -114,6 +114,8 @@ class Posterior {
 
   std::size_t size() const noexcept { return hypotheses_.size(); }
   std::size_t sources() const noexcept { return sources_.size(); }
+  /// What its misfits are worth.
+  const EvidenceSettings& source(std::size_t number) const { return sources_.at(number); }
   bool excluded(std::size_t hypothesis) const { return hypotheses_.at(hypothesis).excluded; }
   const Misfit& misfit(std::size_t hypothesis, std::size_t source = 0) const {
     return hypotheses_.at(hypothesis).misfits.at(source);
