@@ -66,6 +66,13 @@
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 #include <decant/coverage/warp_sum.hpp>
+#include <decant/discovery/disagreement.hpp>
+#include <decant/discovery/effect_curve.hpp>
+#include <decant/discovery/nuisance_space.hpp>
+#include <decant/discovery/silhouette_features.hpp>
+#include <decant/discovery/silhouette_gap.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/strength_profile.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/force/gradient_correction.hpp>
 #include <decant/force/gravity.hpp>

@@ -54,6 +54,7 @@ bool same(const FrameReport& a, const FrameReport& b) {
 void same_bits_as_threads() {
   HypothesisFilterSettings settings;
   settings.posterior.least_squared = 0.5;  // dust is thin, and its model right to the last bit
+  settings.least_probability = 1e-2;  // what is seen in a quarter of a second says no more than that
   MpiExecutor executor;
   HypothesisFilter<DustTracker> threads(settings, ThreadExecutor{{2}});
   HypothesisFilter<DustTracker, MpiExecutor> processes(settings, executor);

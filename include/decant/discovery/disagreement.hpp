@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Where in the picture, and when, simulation and recording disagree.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/pixel_box.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/silhouette_features.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// Squares of the picture that touch each other in space and time, in all of which there is more liquid than expected,
+/// or less. Where it begins points at the cause; where most of it is, at the consequence.
+struct Disagreement {
+  std::size_t camera = 0;
+  bool unexpected = true;           ///< liquid where none is expected; false: none where it is
+  PixelBox box{};                   ///< of all its squares [px]
+  double begin = 0, end = 0;        ///< of its frames [s]
+  double onset_u = 0, onset_v = 0;  ///< middle of what it begins with [px]
+  double weight = 0;                ///< sum of squares, each counted in what differs anyway
+  double largest = 0;               ///< of the squares, counted in what differs anyway
+  std::size_t squares = 0;          ///< over all windows of time
+};
+
+/// @param features where and when they are.
+/// @param off by feature: how far it is from what is expected, in its standard deviations where nothing is missing.
+/// @param threshold beyond which a feature disagrees, > 0.
+/// @return the heaviest first; empty where it is small everywhere, though it may still be much together.
+/// Throws std::invalid_argument if there are not as many as features, or the threshold is out of range.
+inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& features, const Eigen::VectorXd& off,
+                                                    double threshold = 4) {
+  expects(off.size() == static_cast<Eigen::Index>(features.size()), "find_disagreements: deviations",
+          "as many as features", off.size());
+  expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
+  using Key = std::array<int, 4>;  // camera, window, row, column
+  std::map<Key, std::size_t> beyond;
+  for (std::size_t k = 0; k < features.size(); ++k) {
+    if (std::abs(off[static_cast<Eigen::Index>(k)]) > threshold) {
+      const SilhouetteFeatures::Place& place = features.place(k);
+      beyond[{static_cast<int>(place.camera), place.window, place.row, place.column}] = k;
+    }
+  }
+  const auto is_more = [&](std::size_t feature) { return off[static_cast<Eigen::Index>(feature)] > 0; };
+  std::vector<Disagreement> found;
+  while (!beyond.empty()) {
+    std::vector<std::pair<Key, std::size_t>> component{*beyond.begin()};
+    beyond.erase(beyond.begin());
+    for (std::size_t next = 0; next < component.size(); ++next) {
+      const auto [key, feature] = component[next];
+      for (int around = 0; around < 27; ++around) {
+        const Key other{key[0], key[1] + around % 3 - 1, key[2] + around / 3 % 3 - 1, key[3] + around / 9 - 1};
+        const auto touching = beyond.find(other);
+        if (touching != beyond.end() && is_more(touching->second) == is_more(feature)) {
+          component.push_back(*touching);
+          beyond.erase(touching);
+        }
+      }
+    }
+    const SilhouetteFeatures::Place& any = features.place(component.front().second);
+    Disagreement one;
+    one.camera = any.camera;
+    one.unexpected = is_more(component.front().second);
+    one.begin = any.begin;
+    one.end = any.end;
+    one.squares = component.size();
+    int first_window = any.window;
+    for (const auto& [key, feature] : component) {
+      const SilhouetteFeatures::Place& place = features.place(feature);
+      const double size = std::abs(off[static_cast<Eigen::Index>(feature)]);
+      one.box = one.box.hull(place.box);
+      one.begin = std::min(one.begin, place.begin);
+      one.end = std::max(one.end, place.end);
+      one.weight += size * size;
+      one.largest = std::max(one.largest, size);
+      first_window = std::min(first_window, place.window);
+    }
+    double total = 0;
+    for (const auto& [key, feature] : component) {
+      if (key[1] == first_window) {
+        const SilhouetteFeatures::Place& place = features.place(feature);
+        const double size = std::abs(off[static_cast<Eigen::Index>(feature)]);
+        // pixel coordinates are of pixels' middles
+        one.onset_u += size * (0.5 * (place.box.u_begin + place.box.u_end) - 0.5);
+        one.onset_v += size * (0.5 * (place.box.v_begin + place.box.v_end) - 0.5);
+        total += size;
+      }
+    }
+    one.onset_u /= total;
+    one.onset_v /= total;
+    found.push_back(one);
+  }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.weight > b.weight; });
+  return found;
+}
+
+}  // namespace decant::inline DECANT_TARGET

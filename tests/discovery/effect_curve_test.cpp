@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/discovery/effect_curve.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr Index curve_features = 400;
+
+struct Features {
+  explicit Features(std::uint32_t seed) : random(seed) {}
+  MatrixXd noise(Index columns, double deviation = 1) {
+    return MatrixXd::NullaryExpr(curve_features, columns, [&] { return deviation * normal(random); });
+  }
+  std::mt19937 random;
+  std::normal_distribution<double> normal{0, 1};
+};
+
+/// Features that are nothing but noise where nothing is missing.
+NuisanceSpace plain_space(double deviation = 0.3) {
+  Features draw(7);
+  return NuisanceSpace({VectorXd::Zero(curve_features), draw.noise(24, deviation), {}, {}});
+}
+
+}  // namespace
+
+TEST_CASE("effect curve: finds the strength by which features changed, from others that were simulated") {
+  const NuisanceSpace space = plain_space();
+  Features draw(1);
+  const VectorXd first = draw.noise(1), second = draw.noise(1);
+  // what is simulated is not quite the curve's law
+  const auto changed = [&](double s, bool saturating) {
+    const double grown = saturating ? s / (0.3 + s) : s, bent = saturating ? 0 : 0.2 * s * s;
+    return VectorXd(grown * first + bent * second);
+  };
+  for (const bool saturating : {false, true}) {
+    const std::vector<double> strengths{0.7, 0.7, 1.5, 1.5, 3, 3};
+    MatrixXd differences(curve_features, 6);
+    for (Index k = 0; k < 6; ++k) {
+      differences.col(k) = changed(strengths[static_cast<std::size_t>(k)], saturating) + draw.noise(1, 0.1);
+    }
+    const EffectCurve curve(space, strengths, differences, 0, saturating);
+    CHECK(curve.range() == std::pair(0.0, 3.0));
+    for (const double truth : {0.4, 1.1, 2.2}) {
+      const VectorXd seen = space.standardised(space.center() + changed(truth, saturating) + draw.noise(1, 0.3));
+      const StrengthProfile profile = curve.profile(seen);
+      CHECK(profile.best() == Approx(truth).epsilon(0.15).margin(0.05));
+      CHECK(profile.without() == Approx(space.distance(seen)));
+      CHECK(profile.improvement() == Approx(profile.without() - space.distance(seen - curve.at(profile.best()))));
+      CHECK(profile(profile.best()) < 2);
+    }
+  }
+}
+
+TEST_CASE("effect curve: strengths to both sides of what the model has, and one alone") {
+  const NuisanceSpace space = plain_space();
+  Features draw(2);
+  const VectorXd way = draw.noise(1), bend = draw.noise(1);
+  MatrixXd differences(curve_features, 2);
+  differences << way + 0.3 * bend, -way + 0.3 * bend;
+  const EffectCurve both(space, {11, 9}, differences, 10);
+  const auto found = [&](const EffectCurve& curve, const VectorXd& change) {
+    return curve.profile(space.standardised_difference(change)).best();
+  };
+  CHECK(found(both, 0.5 * way + 0.075 * bend) == Approx(10.5).epsilon(1e-4));
+  CHECK(found(both, -0.5 * way + 0.075 * bend) == Approx(9.5).epsilon(1e-4));
+  CHECK(found(both, -3 * way) == Approx(9));  // no further than was simulated
+  const EffectCurve one(space, {14}, way, 10);
+  CHECK(one.range() == std::pair(10.0, 14.0));
+  CHECK(found(one, 0.5 * way) == Approx(12).epsilon(1e-4));
+  CHECK(found(one, -way) == 10);  // an effect that only adds
+}
+
+TEST_CASE("strength profile: an interval holds what is hardly worse, and pours add up") {
+  const NuisanceSpace space = plain_space();
+  Features draw(3);
+  const VectorXd way = draw.noise(1), other_way = draw.noise(1);
+  const EffectCurve curve(space, {4}, 4 * way), other(space, {4}, 4 * other_way);
+  const auto seen = [&](const VectorXd& change) { return space.standardised_difference(change); };
+  const StrengthProfile profile = curve.profile(seen(1.5 * way));
+  // d grows as (s - 1.5)^2 times the distance of one unit
+  const double unit = space.distance(seen(way));
+  const auto [from, to] = profile.within(0.25 * unit);
+  CHECK(from == Approx(1));
+  CHECK(to == Approx(2));
+  CHECK(profile.within(100 * unit) == std::pair(0.0, 4.0));
+
+  StrengthProfile both = profile;
+  both += other.profile(seen(2.5 * other_way));
+  const double other_unit = space.distance(seen(other_way));
+  CHECK(both.best() == Approx((1.5 * unit + 2.5 * other_unit) / (unit + other_unit)).epsilon(1e-4));
+  CHECK(both.without() == Approx(2.25 * unit + 6.25 * other_unit));
+  CHECK_THROWS_WITH(both += EffectCurve(space, {5}, way).profile(seen(way)), decant_test::contains("the same"));
+}
+
+TEST_CASE("effect curve: simulations are checked") {
+  const NuisanceSpace space = plain_space();
+  const MatrixXd two = MatrixXd::Ones(curve_features, 2);
+  CHECK_THROWS_WITH(EffectCurve(space, {1}, two), decant_test::contains("one for each simulation"));
+  CHECK_THROWS_WITH(EffectCurve(space, {3, 3}, two, 3), decant_test::contains("other than the base"));
+  CHECK_THROWS_WITH(EffectCurve(space, {1, 2}, MatrixXd::Ones(3, 2)), decant_test::contains("as many as of the space"));
+  CHECK_THROWS_WITH(EffectCurve(space, {1, std::numeric_limits<double>::infinity()}, two),
+                    decant_test::contains("strength must be finite"));
+  const double no = std::numeric_limits<double>::quiet_NaN();
+  CHECK_THROWS_WITH(EffectCurve(space, {1, 2}, no * two), decant_test::contains("features must be finite"));
+}
