@@ -32,6 +32,22 @@ struct JunctionScore {
   double decided() const { return number_at(*result, "/decided_s"); }
   double third_poured() const { return number_at(*result, "/third_poured_s"); }
   bool in_time() const { return right() && decided() < third_poured(); }
+  /// When a third of a litre has really run out and lies in the bowls; NaN if never.
+  double third_in_bowls() const {
+    const auto& bowls = result->at("truth").at("volume_ml");
+    const auto& time = result->at("posterior_over_time").at("time_s");
+    for (std::size_t frame = 0; frame < time.size(); ++frame) {
+      double sum = 0;
+      for (const auto& [body, volume] : bowls.items()) {
+        sum += volume.at(frame).get<double>();
+      }
+      if (sum >= 1000.0 / 3) {  // of a litre, in ml
+        return time.at(frame).get<double>();
+      }
+    }
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  bool before_bowls() const { return right() && decided() < third_in_bowls(); }
 
   /// The leg that is not wholly open, of those that have one such leg; else the left one.
   std::string leg() const { return of->twin.right_opening < 1 ? "right" : "left"; }
@@ -72,7 +88,7 @@ inline ExperimentSection configurations_by_method(const JunctionExperiment& expe
       header.push_back(answer_text(each.answer));
     }
   }
-  header.insert(header.end(), {"right", "lowest [%]", "before a third is out"});
+  header.insert(header.end(), {"right", "lowest [%]", "before a third is poured", "... is in the bowls"});
   ExperimentSection section{"Which configuration: mean probability of the true one [%]", decant::Table(header)};
   section.bars =
       decant::BarChart{"Mean probability of the true configuration", "true configuration", "probability", {}, {}, {1}};
@@ -94,20 +110,23 @@ inline ExperimentSection configurations_by_method(const JunctionExperiment& expe
       row.push_back(percent_text(mean_of(probability)));
     }
     double lowest = 1;
-    std::size_t right = 0, in_time = 0;
+    std::size_t right = 0, in_time = 0, before_bowls = 0;
     for (const JunctionScore& each : scores) {
       lowest = std::min(lowest, each.probability_of_truth());
       right += each.right() ? 1 : 0;
       in_time += each.in_time() ? 1 : 0;
+      before_bowls += each.before_bowls() ? 1 : 0;
     }
-    row.insert(row.end(), {count_text(right, scores.size()), percent_text(lowest), count_text(in_time, scores.size())});
+    row.insert(row.end(), {count_text(right, scores.size()), percent_text(lowest), count_text(in_time, scores.size()),
+                           count_text(before_bowls, scores.size())});
     section.table.add(row);
     section.bars->bars.push_back(std::move(bars));
-    section.json[method] = {{"right", right}, {"in_time", in_time}, {"lowest", number_json(lowest)}};
+    section.json[method] = {
+        {"right", right}, {"in_time", in_time}, {"before_bowls", before_bowls}, {"lowest", number_json(lowest)}};
   }
   section.note =
-      "The paper: 5 of 5 for the warp field, 4 of 5 for open loop. The last column counts right answers that had 90 % "
-      "for good before a third of the liquid was poured.";
+      "The paper: 5 of 5 for the warp field, 4 of 5 for open loop. The last columns count right answers that had "
+      "90 % for good before a third of the liquid was poured into the pipe, as told, or had run out into the bowls.";
   return section;
 }
 
@@ -150,13 +169,13 @@ inline ExperimentSection openings_table(const std::vector<JunctionScore>& scores
 inline ExperimentSection every_junction(const std::vector<JunctionScore>& scores) {
   ExperimentSection section{"One by one, default method",
                             decant::Table({"recording", "solver", "hidden", "answer", "right", "truth [%]",
-                                           "decided [s]", "a third is out [s]"})};
+                                           "decided [s]", "a third poured [s]", "in the bowls [s]"})};
   std::size_t hypotheses = 0, frames = 0, run = 0, coarse = 0;
   for (const JunctionScore& each : scores) {
     section.table.add({each.of->name, each.solver(), each.hidden(),
                        answer_text(each.result->at("answer").get<std::string>()), each.right() ? "yes" : "NO",
                        percent_text(each.probability_of_truth()), seconds_text(each.decided()),
-                       seconds_text(each.third_poured())});
+                       seconds_text(each.third_poured()), seconds_text(each.third_in_bowls())});
     hypotheses = each.result->at("hypotheses").size();
     frames += hypotheses * each.result->at("posterior_over_time").at("time_s").size();
     run += each.result->at("frames_run").get<std::size_t>();
