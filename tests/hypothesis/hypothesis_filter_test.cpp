@@ -183,6 +183,19 @@ TEST_CASE("hypothesis filter: what is seen for longer says more, up to what a mo
   CHECK(errors_after(0, 1) == Approx(1));  // for how long the first frame's liquid was there is not known
   CHECK(errors_after(0, 13) == Approx(1 + 12 / 60.0 / 0.04));
   CHECK(errors_after(7, 6) == Approx(1 + 6 / 60.0 / 0.04));  // before that nobody looked
+  HypothesisFilter<DustTracker<OpenLoop<double>>> told(settings);
+  told.add(falling_with<OpenLoop<double>>(-2));
+  told.set_source(0, {1.5, 7, 0.5});
+  FallingDust reality = falling_with<OpenLoop<double>>(-2).model();
+  for (int frame = 1; frame <= 3; ++frame) {
+    CHECK(told.posterior().source(0).independent_errors == (frame < 3 ? 1 : 1.5));
+    reality.step(1 / 30.0);
+    const Mask mask = decant_test::seen(reality.dust);
+    const std::vector<CameraMask> masks{{0, mask}};
+    REQUIRE(told.track({frame / 30.0, {}, masks}).advanced());
+    CHECK(told.posterior().source(0).least_squared == 7);
+    CHECK(told.posterior().source(0).hopeless_share == 0.5);
+  }
   settings.posterior.independent_errors = 4;
   CHECK(errors_after(0, 13) == 4);
   settings.error_correlation_time = 0;

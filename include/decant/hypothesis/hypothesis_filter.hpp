@@ -133,8 +133,16 @@ class HypothesisFilter {
   /// Adds a source of evidence beside the masks, such as a scale (see series_misfit.hpp); before hypotheses. Throws as
   /// Posterior::add_source does. @return its number, for observe().
   std::size_t add_source(const EvidenceSettings& settings) { return posterior_.add_source(settings); }
-  /// See Posterior::set_source.
-  void set_source(std::size_t source, const EvidenceSettings& settings) { posterior_.set_source(source, settings); }
+  /// See Posterior::set_source. Of the masks, 0, independent_errors is what they come to in all.
+  void set_source(std::size_t source, const EvidenceSettings& settings) {
+    posterior_.set_source(source, settings);
+    if (source == 0) {
+      settings_.posterior.independent_errors = settings.independent_errors;
+      settings_.posterior.least_squared = settings.least_squared;
+      settings_.posterior.hopeless_share = settings.hopeless_share;
+      posterior_.set_source(0, settings_.evidence_after(seen_seconds_));
+    }
+  }
 
   /// Adds a hypothesis. All trackers have the same cameras and bodies by number, and one time.
   /// @param log_prior logarithm of how probable it is before anything is seen, up to a constant that all share.
