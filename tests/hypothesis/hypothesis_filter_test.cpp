@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <decant/correction/open_loop.hpp>
@@ -176,8 +177,9 @@ TEST_CASE("hypothesis filter: what is seen for longer says more, up to what a mo
     // the odds are what that many errors make of misfits so far
     const double n = filter.posterior().source(0).independent_errors, least = settings.posterior.least_squared;
     CHECK(filter.log_posterior(1) - filter.log_posterior(0) ==
-          Approx(0.5 * n * std::log((least + filter.posterior().misfit(0).squared) /
-                                    (least + filter.posterior().misfit(1).squared))));
+          Approx(0.5 * n *
+                 std::log((least + filter.posterior().misfit(0).squared) /
+                          (least + filter.posterior().misfit(1).squared))));
     return n;
   };
   CHECK(errors_after(0, 1) == Approx(1));  // for how long the first frame's liquid was there is not known
@@ -317,6 +319,39 @@ TEST_CASE("hypothesis filter: ten thousand frames do not underflow, whatever the
     CHECK(filter.probability(0) + filter.probability(1) + filter.probability_of_none() == Approx(1));
     CHECK(filter.probability(0) > 0.99);
     CHECK(filter.log_posterior(1) > -1000);
+  }
+}
+
+TEST_CASE("hypothesis filter: its reports are the trackers' own") {
+  auto alone = falling_with<TransportCorrector<double>>(-1);
+  HypothesisFilter<DustTracker<TransportCorrector<double>>> filter;
+  filter.add(falling_with<TransportCorrector<double>>(-1));
+  FallingDust reality = falling_with<OpenLoop<double>>(-2).model();
+  for (int frame = 1; frame <= 6; ++frame) {
+    reality.step(1 / 30.0);
+    const Mask mask = decant_test::seen(reality.dust);
+    const std::vector<CameraMask> masks{{0, mask}};
+    const FrameReport own = alone.track({frame / 30.0, {}, masks});
+    REQUIRE(filter.track({frame / 30.0, {}, masks}).status == FrameStatus::Ok);
+    const FrameReport& told = filter.report(0);
+    CHECK(told.status == own.status);
+    CHECK(told.time == own.time);
+    for (const auto& [one, other] : {std::pair(told.prior, own.prior), std::pair(told.posterior, own.posterior)}) {
+      CHECK(one.compared_px == other.compared_px);
+      CHECK(one.predicted_px == other.predicted_px);
+      CHECK(one.observed_px == other.observed_px);
+      CHECK(one.both_px == other.both_px);
+      CHECK(one.comparable == other.comparable);
+    }
+    CHECK(told.log_likelihood == own.log_likelihood);
+    CHECK(own.correction.moved > 0);
+    CHECK(told.correction.moved == own.correction.moved);
+    CHECK(told.correction.mean_shift == own.correction.mean_shift);
+    CHECK(told.correction.relocated == own.correction.relocated);
+    CHECK(told.relocated_volume == own.relocated_volume);
+    for (const double wall_time : {told.physics_ms, told.drawing_ms, told.correction_ms, told.relaxation_ms}) {
+      CHECK(wall_time > 0);
+    }
   }
 }
 
