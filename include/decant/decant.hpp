@@ -88,6 +88,7 @@
 #include <decant/force/viscosity.hpp>
 #include <decant/force/viscosity_schenck2017.hpp>
 #include <decant/force/viscosity_weiler2018.hpp>
+#include <decant/force/wall_adhesion.hpp>
 #include <decant/force/wall_friction.hpp>
 #include <decant/hypothesis/best_first_search.hpp>
 #include <decant/hypothesis/evaluation.hpp>

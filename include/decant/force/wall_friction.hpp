@@ -21,8 +21,8 @@ namespace decant::inline DECANT_TARGET {
 /// particles: rate = friction_coefficient / (rho_0 d), so that the same wall has half the rate at twice the spacing d.
 /// With viscosity nu the slip length is nu / (rate d). A layer on a slope slides with g sin(theta) / rate.
 ///
-/// How it differs from the walls of Viscosity (Slip::None): those pull with a rate that follows from nu, 2 nu / (d/2)^2
-/// or so, and hold what is resolved; where the boundary layer is thinner than a particle, as with water in a cup, that
+/// How it differs from the walls of Viscosity (Slip::None): those pull with a rate that follows from nu, 2 nu / d^2 or
+/// so, and hold what is resolved; where the boundary layer is thinner than a particle, as with water in a cup, that
 /// is next to nothing. Here the rate is a number of its own, found by a measurement or a fit: what a rough wall, a
 /// boundary layer that is not resolved, or liquid that wets costs. It acts at every body, that of Slip::Free too, and
 /// adds to what Viscosity does.
