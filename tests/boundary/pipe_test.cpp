@@ -202,6 +202,22 @@ TEST_CASE("pipe blockage: fills the section but for its hole") {
       CHECK(blocked == (radius > hole || opening == 0));
     }
   }
+  for (const double flare : {0.3, 1.0}) {
+    const double opening = 0.25, mouth = 0.5 + flare * 0.5;
+    const decant::TriangleMesh mesh = decant::pipe_blockage(*section, opening, 0.02, flare);
+    const decant::MeshReport report = decant::inspect(mesh, 0.004);
+    CHECK(report.sound());
+    // half of the length is a cylinder, a quarter at each end a frustum of a cone
+    const double hole = 0.5 * opening + 0.5 * (opening + 0.5 * mouth + mouth * mouth) / 3;
+    CHECK(report.material_volume == Approx((1.05 * 1.05 - hole) * section->area * 0.02).epsilon(1e-3));
+    const decant::BoundingVolumeHierarchy blockage(mesh);
+    // between hole and mouth the way is free at the ends alone
+    const double between = 0.5 * (0.5 + mouth) * straight.radius;
+    const auto hit = blockage.first_hit_along(Place(between, 0, 0.01), Place(0, 0, 1), 0.08);
+    REQUIRE(hit);
+    CHECK((hit->point - Place(between, 0, 0.01)).norm() == Approx(0.0325).epsilon(0.02));
+  }
+  CHECK_THROWS_WITH(decant::pipe_blockage(*section, 0.5, 0.006, 1.1), decant_test::contains("flare"));
   CHECK_THROWS_WITH(decant::pipe_blockage(*section, 1, 0.006), decant_test::contains("opening"));
   CHECK_THROWS_WITH(decant::pipe_blockage(*section, 0.5, 0), decant_test::contains("length"));
   CHECK_THROWS_WITH(decant::pipe_blockage({}, 0.5, 0.01), decant_test::contains("outline"));

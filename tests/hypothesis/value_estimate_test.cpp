@@ -129,6 +129,27 @@ TEST_CASE("value estimate: an interval reaches the end also where the density is
   }
 }
 
+TEST_CASE("value estimate: an error beside what is known widens a density") {
+  std::vector<double> values, log_density;
+  for (int k = 0; k <= 40; ++k) {
+    values.push_back(0.025 * k);
+    log_density.push_back(-0.5 * std::pow((values.back() - 0.4) / 0.05, 2));
+  }
+  const decant::ValueDensity known(values, log_density);
+  // variances add up
+  const decant::ValueDensity wide = decant::smeared(known, [](double) { return 0.12; });
+  CHECK(wide.quantile(0.5) == Approx(0.4).epsilon(0.01));
+  CHECK(wide.quantile(0.84134) - wide.quantile(0.15866) == Approx(2 * 0.13).epsilon(0.02));
+  // by what may be an error there: none above a half, where nothing changes but by the grid's width
+  const decant::ValueDensity partly = decant::smeared(known, [](double value) { return value < 0.4 ? 0.1 : 0.0; });
+  CHECK(partly.quantile(0.02) < known.quantile(0.02) - 0.05);
+  CHECK(decant::smeared(known, [](double) { return 0.0; }).quantile(0.9) == Approx(known.quantile(0.9)).epsilon(0.01));
+  // what is certain stays so
+  const std::vector<double> one{3}, certain{0};
+  CHECK(decant::smeared(decant::ValueDensity(one, certain), [](double) { return 1.0; }).quantile(0.3) == 3);
+  CHECK(decant::smeared(known, [](double) { return 100.0; }).range() == std::pair(0.0, 1.0));
+}
+
 TEST_CASE("value estimate: refuses what is no density") {
   const std::vector<double> values{1, 2}, falling{2, 1}, numbers{0, 0}, one{0}, none{};
   const std::vector<double> nowhere(2, -std::numeric_limits<double>::infinity()), broken{0, std::nan("")};

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <iterator>
 #include <span>
 #include <utility>
@@ -50,6 +51,8 @@ class ValueDensity {
   }
 
   double mean() const noexcept { return mean_; }
+  /// The smallest and the largest value.
+  std::pair<double, double> range() const noexcept { return {values_.front(), values_.back()}; }
 
   /// The value that a share in [0, 1] of the density is below.
   double quantile(double share) const noexcept {
@@ -173,6 +176,38 @@ class ValueDensity {
   std::vector<double> below_{};  // share of the density up to the end of each piece
   double mean_ = 0;
 };
+
+/// The density of a quantity that differs from one whose density is known by a normal error, within the same range: for
+/// what all hypotheses have in common and none of them asks about. @param deviation(value) of the error, >= 0, in units
+/// of the value; where it is less than a two hundredth of the range, it counts as that much. A density of one value
+/// stays as it is.
+template <class Deviation>
+ValueDensity smeared(const ValueDensity& density, Deviation&& deviation) {
+  const auto [low, high] = density.range();
+  if (low == high) {
+    return density;
+  }
+  constexpr int steps = 200;
+  std::vector<double> values, shares(steps + 1, 0.0), log_density;
+  for (int k = 0; k <= steps; ++k) {
+    values.push_back(k == steps ? high : low + k * (high - low) / steps);
+  }
+  double below = 0;
+  for (int k = 0; k < steps; ++k) {  // the share between two values, as if it stood in their middle
+    const auto at = static_cast<std::size_t>(k);
+    const double middle = 0.5 * (values[at] + values[at + 1]), until = density.share_below(values[at + 1]);
+    const double width = std::max(static_cast<double>(deviation(middle)), (high - low) / steps);
+    for (std::size_t other = 0; other < values.size(); ++other) {
+      const double off = (values[other] - middle) / width;
+      shares[other] += (until - below) / width * std::exp(-0.5 * off * off);
+    }
+    below = until;
+  }
+  for (const double share : shares) {
+    log_density.push_back(share > 0 ? std::log(share) : -std::numeric_limits<double>::infinity());
+  }
+  return ValueDensity(values, log_density);
+}
 
 /// Mean, median and interval of a density. @param confidence in (0, 1). Throws std::invalid_argument otherwise.
 inline ValueEstimate estimate_value(const ValueDensity& density, double confidence = 0.9) {
