@@ -37,6 +37,19 @@ NuisanceSpace plain_space(double deviation = 0.3) {
   return NuisanceSpace({VectorXd::Zero(curve_features), draw.noise(24, deviation), {}, {}});
 }
 
+/// Of one component.
+EffectCurve curve_of(const NuisanceSpace& space, const std::vector<double>& strengths, const MatrixXd& differences,
+                     double base = 0, bool saturating = false) {
+  std::vector<EffectCurve::Strength> each;
+  for (const double strength : strengths) {
+    each.push_back(VectorXd::Constant(1, strength));
+  }
+  return {space, {{base, saturating}}, each, differences};
+}
+
+VectorXd one(double strength) { return VectorXd::Constant(1, strength); }
+VectorXd two(double first, double second) { return Eigen::Vector2d(first, second); }
+
 }  // namespace
 
 TEST_CASE("effect curve: finds the strength by which features changed, from others that were simulated") {
@@ -54,12 +67,12 @@ TEST_CASE("effect curve: finds the strength by which features changed, from othe
     for (Index k = 0; k < 6; ++k) {
       differences.col(k) = changed(strengths[static_cast<std::size_t>(k)], saturating) + draw.noise(1, 0.1);
     }
-    const EffectCurve curve(space, strengths, differences, 0, saturating);
-    CHECK(curve.range() == std::pair(0.0, 3.0));
+    const EffectCurve curve = curve_of(space, strengths, differences, 0, saturating);
+    CHECK(curve.axes().front().range == std::pair(0.0, 3.0));
     for (const double truth : {0.4, 1.1, 2.2}) {
       const VectorXd seen = space.standardised(space.center() + changed(truth, saturating) + draw.noise(1, 0.3));
       const StrengthProfile profile = curve.profile(seen);
-      CHECK(profile.best() == Approx(truth).epsilon(0.15).margin(0.05));
+      CHECK(profile.best()[0] == Approx(truth).epsilon(0.15).margin(0.05));
       CHECK(profile.without() == Approx(space.distance(seen)));
       CHECK(profile.improvement() == Approx(profile.without() - space.distance(seen - curve.at(profile.best()))));
       CHECK(profile(profile.best()) < 2);
@@ -73,49 +86,85 @@ TEST_CASE("effect curve: strengths to both sides of what the model has, and one 
   const VectorXd way = draw.noise(1), bend = draw.noise(1);
   MatrixXd differences(curve_features, 2);
   differences << way + 0.3 * bend, -way + 0.3 * bend;
-  const EffectCurve both(space, {11, 9}, differences, 10);
+  const EffectCurve both = curve_of(space, {11, 9}, differences, 10);
   const auto found = [&](const EffectCurve& curve, const VectorXd& change) {
-    return curve.profile(space.standardised_difference(change)).best();
+    return curve.profile(space.standardised_difference(change)).best()[0];
   };
   CHECK(found(both, 0.5 * way + 0.075 * bend) == Approx(10.5).epsilon(1e-4));
   CHECK(found(both, -0.5 * way + 0.075 * bend) == Approx(9.5).epsilon(1e-4));
   CHECK(found(both, -3 * way) == Approx(9));  // no further than was simulated
-  const EffectCurve one(space, {14}, way, 10);
-  CHECK(one.range() == std::pair(10.0, 14.0));
-  CHECK(found(one, 0.5 * way) == Approx(12).epsilon(1e-4));
-  CHECK(found(one, -way) == 10);  // an effect that only adds
+  const EffectCurve up = curve_of(space, {14}, way, 10);
+  CHECK(up.axes().front().range == std::pair(10.0, 14.0));
+  CHECK(found(up, 0.5 * way) == Approx(12).epsilon(1e-4));
+  CHECK(found(up, -way) == 10);  // an effect that only adds
 }
 
 TEST_CASE("strength profile: an interval holds what is hardly worse, and pours add up") {
   const NuisanceSpace space = plain_space();
   Features draw(3);
   const VectorXd way = draw.noise(1), other_way = draw.noise(1);
-  const EffectCurve curve(space, {4}, 4 * way), other(space, {4}, 4 * other_way);
+  const EffectCurve curve = curve_of(space, {4}, 4 * way), other = curve_of(space, {4}, 4 * other_way);
   const auto seen = [&](const VectorXd& change) { return space.standardised_difference(change); };
   const StrengthProfile profile = curve.profile(seen(1.5 * way));
   // d grows as (s - 1.5)^2 times the distance of one unit
   const double unit = space.distance(seen(way));
-  const auto [from, to] = profile.within(0.25 * unit);
+  const auto [from, to] = profile.within(0, 0.25 * unit);
   CHECK(from == Approx(1));
   CHECK(to == Approx(2));
-  CHECK(profile.within(100 * unit) == std::pair(0.0, 4.0));
+  CHECK(profile.within(0, 100 * unit) == std::pair(0.0, 4.0));
 
   StrengthProfile both = profile;
   both += other.profile(seen(2.5 * other_way));
   const double other_unit = space.distance(seen(other_way));
-  CHECK(both.best() == Approx((1.5 * unit + 2.5 * other_unit) / (unit + other_unit)).epsilon(1e-4));
+  CHECK(both.best()[0] == Approx((1.5 * unit + 2.5 * other_unit) / (unit + other_unit)).epsilon(1e-4));
   CHECK(both.without() == Approx(2.25 * unit + 6.25 * other_unit));
-  CHECK_THROWS_WITH(both += EffectCurve(space, {5}, way).profile(seen(way)), decant_test::contains("the same"));
+  CHECK_THROWS_WITH(both += curve_of(space, {5}, way).profile(seen(way)), decant_test::contains("the same"));
+}
+
+TEST_CASE("effect curve: components add up, and each has its own strength and interval") {
+  const NuisanceSpace space = plain_space();
+  Features draw(4);
+  const VectorXd across = draw.noise(1), along = draw.noise(1), bend = draw.noise(1);
+  // the second one bends, and both are simulated alone
+  MatrixXd differences(curve_features, 4);
+  differences << 2 * across, -2 * across, along + 0.5 * bend, -along + 0.5 * bend;
+  const EffectCurve curve(space, {{0}, {10}}, {two(2, 10), two(-2, 10), two(0, 11), two(0, 9)}, differences);
+  CHECK(curve.axes()[1].range == std::pair(9.0, 11.0));
+  const VectorXd change = -0.7 * across + 0.6 * along + 0.36 * 0.5 * bend;
+  const StrengthProfile profile = curve.profile(space.standardised_difference(change));
+  CHECK(profile.best()[0] == Approx(-0.7).epsilon(1e-3));
+  CHECK(profile.best()[1] == Approx(10.6).epsilon(1e-4));
+  CHECK(profile(profile.best()) == Approx(0).margin(1e-6));
+  CHECK(profile.without() == Approx(space.distance(space.standardised_difference(change))));
+  CHECK((curve.at(profile.best()) - space.standardised_difference(change)).norm() < 1e-3);
+
+  // Two that look alike: each alone can be anything as long as their sum fits, which an interval has to say.
+  MatrixXd alike(curve_features, 2);
+  alike << across, across + 0.01 * along;
+  const EffectCurve same(space, {{0}, {0}}, {two(1, 0), two(0, 1)}, alike);
+  const StrengthProfile unsure = same.profile(space.standardised_difference(across));
+  const double unit = space.distance(space.standardised_difference(across));
+  const auto [from, to] = unsure.within(0, 0.1 * unit);
+  CHECK(from == Approx(0).margin(1e-6));
+  CHECK(to == Approx(1).margin(1e-6));
+  const StrengthProfile sure = curve.profile(space.standardised_difference(across));
+  const auto [low, high] = sure.within(0, 0.01 * unit);
+  CHECK(low == Approx(0.9).epsilon(0.01));
+  CHECK(high == Approx(1.1).epsilon(0.01));
 }
 
 TEST_CASE("effect curve: simulations are checked") {
   const NuisanceSpace space = plain_space();
-  const MatrixXd two = MatrixXd::Ones(curve_features, 2);
-  CHECK_THROWS_WITH(EffectCurve(space, {1}, two), decant_test::contains("one for each simulation"));
-  CHECK_THROWS_WITH(EffectCurve(space, {3, 3}, two, 3), decant_test::contains("other than the base"));
-  CHECK_THROWS_WITH(EffectCurve(space, {1, 2}, MatrixXd::Ones(3, 2)), decant_test::contains("as many as of the space"));
-  CHECK_THROWS_WITH(EffectCurve(space, {1, std::numeric_limits<double>::infinity()}, two),
+  const MatrixXd both = MatrixXd::Ones(curve_features, 2);
+  CHECK_THROWS_WITH(curve_of(space, {1}, both), decant_test::contains("one for each simulation"));
+  CHECK_THROWS_WITH(curve_of(space, {3, 3}, both, 3), decant_test::contains("other than the base"));
+  CHECK_THROWS_WITH(curve_of(space, {1, 2}, MatrixXd::Ones(3, 2)), decant_test::contains("as many as of the space"));
+  CHECK_THROWS_WITH(curve_of(space, {1, std::numeric_limits<double>::infinity()}, both),
                     decant_test::contains("strength must be finite"));
   const double no = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THROWS_WITH(EffectCurve(space, {1, 2}, no * two), decant_test::contains("features must be finite"));
+  CHECK_THROWS_WITH(curve_of(space, {1, 2}, no * both), decant_test::contains("features must be finite"));
+  CHECK_THROWS_WITH(EffectCurve(space, {{0}, {0}}, {one(1), one(2)}, both),
+                    decant_test::contains("a number for each component"));
+  CHECK_THROWS_WITH(EffectCurve(space, {{0}, {0}}, {two(1, 0), two(2, 0)}, both),
+                    decant_test::contains("other than the base"));
 }

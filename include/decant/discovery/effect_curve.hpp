@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,77 +22,113 @@
 
 namespace decant::inline DECANT_TARGET {
 
+/// One component of an effect's strength, as a model has it.
+struct StrengthBase {
+  double base = 0;          ///< what the model has
+  bool saturating = false;  ///< see StrengthLaw
+};
+
 /// A curve through standardised features, fitted to simulations with the effect less the baseline by least squares.
-/// Two coefficients per feature smooth what is chaotic in single simulations. Beyond the simulated strengths it says
-/// nothing.
+/// Two coefficients per feature and component smooth what is chaotic in single simulations; components add up. Beyond
+/// the simulated strengths it says nothing.
 class EffectCurve {
  public:
+  using Strength = StrengthProfile::Strength;
+
   /// @param space has to outlive it.
-  /// @param strengths of each simulation, one or more other than `base`; several may be equal (other seeds).
+  /// @param components one to three. @param strengths of each simulation, by component; each component has one or more
+  /// other than its base, and several simulations may have the same (other seeds).
   /// @param differences p x as many: features less the space's center.
-  /// @param base strength that the model has. @param saturating see StrengthLaw.
   /// Throws std::invalid_argument if numbers do not fit or are not finite.
-  EffectCurve(const NuisanceSpace& space, const std::vector<double>& strengths, const Eigen::MatrixXd& differences,
-              double base = 0, bool saturating = false)
-      : space_(&space) {
+  EffectCurve(const NuisanceSpace& space, const std::vector<StrengthBase>& components,
+              const std::vector<Strength>& strengths, const Eigen::MatrixXd& differences)
+      : space_(&space), axes_(components.size()) {
     expects(differences.rows() == space.features(), "EffectCurve: features", "as many as of the space",
             differences.rows());
     expects(differences.cols() == static_cast<Eigen::Index>(strengths.size()), "EffectCurve: strengths",
             "one for each simulation", strengths.size());
     expects(differences.allFinite(), "EffectCurve: features", "finite", "others");
-    std::set<double> distinct;
-    range_ = {base, base};
-    for (const double strength : strengths) {
-      expects(std::isfinite(strength), "EffectCurve: strength", "finite", strength);
-      range_ = {std::min(range_.first, strength), std::max(range_.second, strength)};
-      if (strength != base) {
-        distinct.insert(strength);
+    std::vector<Eigen::Index> used;  // of the terms of all laws
+    for (std::size_t k = 0; k < components.size(); ++k) {
+      const std::size_t distinct = set_axis(k, components[k], strengths);
+      used.push_back(static_cast<Eigen::Index>(2 * k));
+      if (distinct > 1) {
+        used.push_back(static_cast<Eigen::Index>(2 * k + 1));
       }
     }
-    expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", base);
-    law_ = {base, std::max(range_.second - base, base - range_.first), saturating};
-
-    const Eigen::Index terms = distinct.size() > 1 ? 2 : 1;
-    Eigen::MatrixXd at(terms, differences.cols()), standardised(differences.rows(), differences.cols());
+    Eigen::MatrixXd at(static_cast<Eigen::Index>(used.size()), differences.cols());
+    Eigen::MatrixXd standardised(differences.rows(), differences.cols());
     for (Eigen::Index k = 0; k < differences.cols(); ++k) {
-      const std::array<double, 2> law = law_(strengths[static_cast<std::size_t>(k)]);
-      for (Eigen::Index term = 0; term < terms; ++term) {
-        at(term, k) = law[static_cast<std::size_t>(term)];
-      }
+      const Eigen::VectorXd phi = terms(strengths[static_cast<std::size_t>(k)]);
+      at.col(k) = phi(used);
       standardised.col(k) = space.standardised_difference(differences.col(k));
     }
-    coefficient_.setZero(differences.rows(), 2);
     const Eigen::MatrixXd normal = at * at.transpose();
-    coefficient_.leftCols(terms) = normal.ldlt().solve(at * standardised.transpose()).transpose();
-    for (Eigen::Index i = 0; i < 2; ++i) {
-      for (Eigen::Index j = 0; j < 2; ++j) {
+    const Eigen::MatrixXd solved = normal.ldlt().solve(at * standardised.transpose()).transpose();
+    const auto count = static_cast<Eigen::Index>(2 * components.size());
+    coefficient_.setZero(differences.rows(), count);
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      coefficient_.col(used[k]) = solved.col(static_cast<Eigen::Index>(k));
+    }
+    expects(coefficient_.allFinite(), "EffectCurve: strengths", "enough of each component apart from the others",
+            "too few");
+    square_.resize(count, count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      for (Eigen::Index j = 0; j < count; ++j) {
         square_(i, j) = space.inner(coefficient_.col(i), coefficient_.col(j));
       }
     }
   }
 
   /// What the effect changes, in standardised features.
-  Eigen::VectorXd at(double strength) const {
-    const std::array<double, 2> law = law_(strength);
-    return law[0] * coefficient_.col(0) + law[1] * coefficient_.col(1);
-  }
+  Eigen::VectorXd at(const Strength& strength) const { return coefficient_ * terms(strength); }
 
-  /// From the base to the largest strengths that were simulated.
-  const std::pair<double, double>& range() const noexcept { return range_; }
+  /// By component, from the base to the largest strengths that were simulated.
+  const std::vector<StrengthAxis>& axes() const noexcept { return axes_; }
 
   /// How far standardised features are from the curve.
   StrengthProfile profile(const Eigen::VectorXd& standardised) const {
-    const Eigen::Vector2d answer(space_->inner(standardised, coefficient_.col(0)),
-                                 space_->inner(standardised, coefficient_.col(1)));
-    return {law_, range_, space_->distance(standardised), answer, square_};
+    Eigen::VectorXd answer(coefficient_.cols());
+    for (Eigen::Index k = 0; k < answer.size(); ++k) {
+      answer[k] = space_->inner(standardised, coefficient_.col(k));
+    }
+    return {axes_, space_->distance(standardised), std::move(answer), square_};
   }
 
  private:
+  /// @return how many strengths other than the base there are.
+  std::size_t set_axis(std::size_t component, const StrengthBase& of, const std::vector<Strength>& strengths) {
+    std::set<double> distinct;
+    std::pair<double, double> range{of.base, of.base};
+    for (const Strength& each : strengths) {
+      expects(each.size() == static_cast<Eigen::Index>(axes_.size()), "EffectCurve: strength of a simulation",
+              "a number for each component", each.size());
+      const double strength = each[static_cast<Eigen::Index>(component)];
+      expects(std::isfinite(strength), "EffectCurve: strength", "finite", strength);
+      range = {std::min(range.first, strength), std::max(range.second, strength)};
+      if (strength != of.base) {
+        distinct.insert(strength);
+      }
+    }
+    expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", of.base);
+    axes_[component] = {{of.base, std::max(range.second - of.base, of.base - range.first), of.saturating}, range};
+    return distinct.size();
+  }
+
+  Eigen::VectorXd terms(const Strength& strength) const {
+    Eigen::VectorXd phi(static_cast<Eigen::Index>(2 * axes_.size()));
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      const std::array<double, 2> law = axes_[k].law(strength[static_cast<Eigen::Index>(k)]);
+      phi[static_cast<Eigen::Index>(2 * k)] = law[0];
+      phi[static_cast<Eigen::Index>(2 * k + 1)] = law[1];
+    }
+    return phi;
+  }
+
   const NuisanceSpace* space_;
-  StrengthLaw law_;
-  std::pair<double, double> range_;
-  Eigen::MatrixXd coefficient_;  ///< p x 2
-  Eigen::Matrix2d square_;
+  std::vector<StrengthAxis> axes_;
+  Eigen::MatrixXd coefficient_{};  ///< p x two for each component
+  Eigen::MatrixXd square_{};
 };
 
 }  // namespace decant::inline DECANT_TARGET

@@ -62,16 +62,38 @@ class SilhouetteSeries {
   }
 
   /// As numbers, for an Executor or a Journal, and back into a series of the same image and frames, which says the size
-  /// and when frames are.
-  std::vector<double> numbers() const { return {share_.begin(), share_.end()}; }
-  /// Throws std::invalid_argument if they are not as many as of this series, or no bytes.
-  SilhouetteSeries with_numbers(std::span<const double> numbers) const {
-    expects(numbers.size() == share_.size(), "SilhouetteSeries: numbers", "as many as of the series", numbers.size());
-    SilhouetteSeries other = *this;
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      expects(numbers[k] >= 0 && numbers[k] <= 255, "SilhouetteSeries: number", "0 .. 255", numbers[k]);
-      other.share_[k] = static_cast<std::uint8_t>(numbers[k]);
+  /// and when frames are. Cells' bytes one after another, with -n for n that are dry: most are.
+  std::vector<double> numbers() const {
+    std::vector<double> result;
+    for (std::size_t k = 0; k < share_.size();) {
+      const auto wet = std::find_if(share_.begin() + static_cast<std::ptrdiff_t>(k), share_.end(),
+                                    [](std::uint8_t share) { return share != 0; });
+      const auto next = static_cast<std::size_t>(wet - share_.begin());
+      if (next > k) {
+        result.push_back(-static_cast<double>(next - k));
+        k = next;
+      } else {
+        result.push_back(share_[k++]);
+      }
     }
+    return result;
+  }
+  /// Throws std::invalid_argument if they are none of such a series.
+  SilhouetteSeries with_numbers(std::span<const double> numbers) const {
+    SilhouetteSeries other = *this;
+    other.share_.clear();
+    for (const double number : numbers) {
+      const double left = static_cast<double>(share_.size() - other.share_.size());
+      expects(number == std::floor(number) && number <= 255 && number >= -left && left >= 1, "SilhouetteSeries: number",
+              "a byte, or minus how many cells are dry", number);
+      if (number < 0) {
+        other.share_.resize(other.share_.size() + static_cast<std::size_t>(-number), 0);
+      } else {
+        other.share_.push_back(static_cast<std::uint8_t>(number));
+      }
+    }
+    expects(other.share_.size() == share_.size(), "SilhouetteSeries: cells of the numbers", "as many as of the series",
+            other.share_.size());
     return other;
   }
 

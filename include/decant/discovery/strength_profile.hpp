@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -15,8 +17,9 @@
 
 namespace decant::inline DECANT_TARGET {
 
-/// How features answer an effect as its strength s grows from what the model has, u = (s - base) / scale:
-/// c_1 u + c_2 u^2, or c_1 u / (0.15 + |u|) + c_2 u where they answer less and less (viscosity, friction at walls).
+/// How features answer one component of an effect as its strength s grows from what the model has, u = (s - base) /
+/// scale: c_1 u + c_2 u^2, or c_1 u / (0.15 + |u|) + c_2 u where they answer less and less (viscosity, friction at
+/// walls).
 struct StrengthLaw {
   double base = 0;   ///< strength that the model has
   double scale = 1;  ///< > 0: the largest |s - base| that is asked about
@@ -29,61 +32,65 @@ struct StrengthLaw {
   bool operator==(const StrengthLaw&) const = default;
 };
 
-/// Distances d(s) = d_0 - 2 b . phi(s) + phi(s)' G phi(s), phi being the law. Those of several pours with one strength
-/// add up.
+/// One component of a strength (a drag has one, a sideways pull has two), and which values of it are asked about.
+struct StrengthAxis {
+  StrengthLaw law{};
+  std::pair<double, double> range{0, 0};  ///< the lower first
+
+  bool operator==(const StrengthAxis&) const = default;
+};
+
+/// Distances d(s) = d_0 - 2 b . phi(s) + phi(s)' G phi(s), phi being the laws of all components one after another.
+/// Those of several pours with one strength add up.
 class StrengthProfile {
  public:
-  /// @param range strengths that are asked about, the lower first.
-  /// @param without d_0: the distance at the law's base. @param answer b. @param square G.
-  StrengthProfile(const StrengthLaw& law, std::pair<double, double> range, double without,
-                  const Eigen::Vector2d& answer, const Eigen::Matrix2d& square)
-      : law_(law), range_(range), without_(without), answer_(answer), square_(square) {
-    expects(law.scale > 0, "StrengthProfile: scale", "> 0", law.scale);
-    expects(range.first <= range.second, "StrengthProfile: range", "the lower end first", range.first);
+  using Strength = Eigen::VectorXd;  ///< a number for each component
+
+  /// @param axes one to three, by component. @param without d_0: the distance at the laws' bases. @param answer b.
+  /// @param square G.
+  StrengthProfile(std::vector<StrengthAxis> axes, double without, Eigen::VectorXd answer, Eigen::MatrixXd square)
+      : axes_(std::move(axes)), without_(without), answer_(std::move(answer)), square_(std::move(square)) {
+    const auto terms = static_cast<Eigen::Index>(2 * axes_.size());
+    expects(!axes_.empty() && axes_.size() <= 3, "StrengthProfile: components", "1 .. 3", axes_.size());
+    expects(answer_.size() == terms && square_.rows() == terms && square_.cols() == terms, "StrengthProfile: terms",
+            "two for each component", answer_.size());
+    for (const StrengthAxis& axis : axes_) {
+      expects(axis.law.scale > 0, "StrengthProfile: scale", "> 0", axis.law.scale);
+      expects(axis.range.first <= axis.range.second, "StrengthProfile: range", "the lower end first", axis.range.first);
+    }
+    best_ = lowest_with(axes_.size(), 0);
   }
 
-  double operator()(double strength) const noexcept {
-    const std::array<double, 2> law = law_(strength);
-    const Eigen::Vector2d phi(law[0], law[1]);
+  std::size_t components() const noexcept { return axes_.size(); }
+  const StrengthAxis& axis(std::size_t component) const { return axes_.at(component); }
+
+  double operator()(const Strength& strength) const {
+    const Eigen::VectorXd phi = terms(strength);
     return without_ - 2 * answer_.dot(phi) + phi.dot(square_ * phi);
   }
 
   /// Distance where the effect is as the model has it.
   double without() const noexcept { return without_; }
-  const std::pair<double, double>& range() const noexcept { return range_; }
-
-  /// Where it is smallest; of equals the lowest.
-  double best() const noexcept {
-    double best = range_.first;
-    const auto look = [&](double strength) { best = (*this)(strength) < (*this)(best) ? strength : best; };
-    for (int k = 1; k <= steps; ++k) {
-      look(place(k));
-    }
-    double width = (range_.second - range_.first) / steps;
-    while (width > 1e-6 * law_.scale) {  // between the steps
-      const double around = best;
-      look(std::max(range_.first, around - 0.5 * width));
-      look(std::min(range_.second, around + 0.5 * width));
-      width *= 0.5;
-    }
-    return best;
-  }
+  /// Where it is smallest.
+  const Strength& best() const noexcept { return best_; }
   /// By how much it is smaller there than without the effect.
-  double improvement() const noexcept { return without_ - (*this)(best()); }
+  double improvement() const { return without_ - (*this)(best_); }
 
-  /// Strengths next to the best one at which it is larger by less than `more`, > 0.
-  std::pair<double, double> within(double more) const noexcept {
-    const double middle = best(), limit = (*this)(middle) + more;
+  /// Strengths of one component, next to the best one, at which the distance is larger by less than `more`, > 0, with
+  /// the other components as they then fit best.
+  std::pair<double, double> within(std::size_t component, double more) const {
+    const double limit = (*this)(best_) + more;
+    const auto index = static_cast<Eigen::Index>(component);
     const auto end = [&](double towards) {
-      double inside = middle;
-      const double step = (towards - middle) / fine_steps;
+      double inside = best_[index];
+      const double step = (towards - inside) / fine_steps;
       for (int k = 1; k <= fine_steps; ++k) {
-        const double next = k == fine_steps ? towards : middle + k * step;
-        if ((*this)(next) > limit) {
+        const double next = k == fine_steps ? towards : best_[index] + k * step;
+        if ((*this)(lowest_with(component, next)) > limit) {
           double outside = next;
-          for (int halving = 0; halving < 40; ++halving) {
+          for (int halving = 0; halving < 30; ++halving) {
             const double half = 0.5 * (inside + outside);
-            ((*this)(half) > limit ? outside : inside) = half;
+            ((*this)(lowest_with(component, half)) > limit ? outside : inside) = half;
           }
           break;
         }
@@ -91,29 +98,90 @@ class StrengthProfile {
       }
       return inside;
     };
-    return {end(range_.first), end(range_.second)};
+    return {end(axes_.at(component).range.first), end(axes_.at(component).range.second)};
   }
 
   /// With another pour's; throws std::invalid_argument if it is about other strengths.
   StrengthProfile& operator+=(const StrengthProfile& other) {
-    expects(other.law_ == law_ && other.range_ == range_, "StrengthProfile: law and range of what is added", "the same",
-            "others");
+    expects(other.axes_ == axes_, "StrengthProfile: laws and ranges of what is added", "the same", "others");
     without_ += other.without_;
     answer_ += other.answer_;
     square_ += other.square_;
+    best_ = lowest_with(axes_.size(), 0);
     return *this;
   }
 
  private:
-  static constexpr int steps = 40, fine_steps = 200;
+  static constexpr int fine_steps = 50;
 
-  double place(int step) const noexcept { return range_.first + step * (range_.second - range_.first) / steps; }
+  Eigen::VectorXd terms(const Strength& strength) const {
+    Eigen::VectorXd phi(static_cast<Eigen::Index>(2 * axes_.size()));
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      const std::array<double, 2> law = axes_[k].law(strength[static_cast<Eigen::Index>(k)]);
+      phi[static_cast<Eigen::Index>(2 * k)] = law[0];
+      phi[static_cast<Eigen::Index>(2 * k + 1)] = law[1];
+    }
+    return phi;
+  }
 
-  StrengthLaw law_;
-  std::pair<double, double> range_;
+  /// The smallest distance where one component has a value; of all, where there is no such component. Looks on a grid,
+  /// then around the best of it in smaller and smaller steps: distances are smooth, but may have several valleys.
+  Strength lowest_with(std::size_t held, double value) const {
+    const int steps = axes_.size() == 1 ? 40 : 12;
+    Strength best(static_cast<Eigen::Index>(axes_.size()));
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      best[static_cast<Eigen::Index>(k)] = k == held ? value : axes_[k].range.first;
+    }
+    double lowest = (*this)(best);
+    const auto look = [&](const Strength& strength) {
+      const double distance = (*this)(strength);
+      if (distance < lowest) {
+        lowest = distance;
+        best = strength;
+      }
+    };
+    Strength place = best;
+    const auto visit = [&](const auto& self, std::size_t k) -> void {
+      if (k == axes_.size()) {
+        look(place);
+        return;
+      }
+      const auto [low, high] = axes_[k].range;
+      const int count = k == held || high == low ? 0 : steps;
+      for (int step = 0; step <= count; ++step) {
+        place[static_cast<Eigen::Index>(k)] = k == held       ? value
+                                              : step == 0     ? low
+                                              : step == count ? high
+                                                              : low + step * (high - low) / steps;
+        self(self, k + 1);
+      }
+    };
+    visit(visit, 0);
+    for (double share = 1.0 / steps; share > 1e-6; share *= 0.5) {
+      for (bool moved = true; moved;) {
+        const double before = lowest;
+        for (std::size_t k = 0; k < axes_.size(); ++k) {
+          if (k != held) {
+            const auto index = static_cast<Eigen::Index>(k);
+            const auto [low, high] = axes_[k].range;
+            for (const double way : {-share, share}) {
+              Strength next = best;
+              next[index] = std::clamp(best[index] + way * (high - low), low, high);
+              look(next);
+            }
+          }
+        }
+        moved = lowest < before - 1e-12 * std::abs(before);
+      }
+    }
+    return best;
+  }
+
+  std::vector<StrengthAxis> axes_;
   double without_;
-  Eigen::Vector2d answer_;
-  Eigen::Matrix2d square_;
+  Eigen::VectorXd answer_;
+  Eigen::MatrixXd square_;
+  Strength best_{};
 };
 
 }  // namespace decant::inline DECANT_TARGET

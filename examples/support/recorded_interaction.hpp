@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A recording as the workflow for missing effects takes it: a simulation that can be given effects, and silhouettes as
+/// they were seen.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/boundary/cavity.hpp>
+#include <decant/camera/distorted_pinhole_camera.hpp>
+#include <decant/coverage/mask_cleaning.hpp>
+#include <decant/discovery/liquid_effects.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/simulated_interaction.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/simulation/simulator.hpp>
+
+#include "tracking_run.hpp"
+
+namespace example {
+
+using EffectModel = decant::Simulator<decant::EffectParts<float>>;
+using RecordedModel = decant::SimulatedInteraction<EffectModel, decant::DistortedPinholeCamera>;
+
+struct InteractionOptions {
+  double frames_per_second = 15;  ///< of those of the recording that are compared
+  decant::SimulatedInteractionSettings model{};
+};
+
+/// A recording, ready to be explained.
+struct RecordedInteraction {
+  decant::Recording recording;
+  RecordedModel model;
+  std::vector<decant::SilhouetteSeries> seen;  ///< by camera
+};
+
+namespace detail {
+
+/// Numbers of the frames that are compared: the first one, and then whichever is next after the time between two.
+inline std::vector<std::size_t> compared_frames(const decant::Recording& recording, double frames_per_second) {
+  std::vector<std::size_t> frames;
+  for (std::size_t frame = 0; frame < recording.frames; ++frame) {
+    const double since = recording.timestamps[frame] - recording.timestamps.front();
+    if (since * frames_per_second > static_cast<double>(frames.size()) - 0.25) {
+      frames.push_back(frame);
+    }
+  }
+  return frames;
+}
+
+/// Masks in cells, cleaned. Frames without a mask, and empty ones between others, are faults of the camera.
+inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std::size_t camera,
+                                        const std::vector<std::size_t>& frames, int cell_px) {
+  using namespace decant;
+  const TrackerSettings tracker;
+  MaskCleaning cleaning(tracker.cleaning_window_px, tracker.smallest_region_px);
+  std::vector<std::optional<Mask>> masks;
+  std::size_t first = frames.size(), last = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    masks.push_back(recording.liquid_mask(frames[k], camera));
+    if (masks.back()) {
+      Mask cleaned(recording.height, recording.width);
+      cleaning.apply(*masks.back(), cleaned);
+      masks.back() = std::move(cleaned);
+      if ((masks.back()->array() >= 128).any()) {
+        first = std::min(first, k);
+        last = k;
+      }
+    }
+  }
+  SilhouetteSeries series(recording.width, recording.height, cell_px);
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const double time = recording.timestamps[frames[k]];
+    const bool blank = masks[k] && first <= k && k <= last && !(masks[k]->array() >= 128).any();
+    if (masks[k] && !blank) {
+      series.add(time, *masks[k]);
+    } else {
+      series.add_unseen(time);
+    }
+  }
+  return series;
+}
+
+/// Where liquid leaves the source and where it should go: the lip of the most tilted pose, and the target's middle.
+struct PourPlaces {
+  decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way between the two [m]
+  decant::Vector3<double> target = decant::Vector3<double>::Zero();
+};
+
+inline PourPlaces pour_places(const decant::Recording& recording) {
+  using namespace decant;
+  const Vector3<double> up = -recording.gravity.normalized();
+  PourPlaces places;
+  Vector3<double> lip = Vector3<double>::Zero();
+  bool source = false, target = false;
+  for (const recording::Body& body : recording.bodies) {
+    const BoundingVolumeHierarchy surface(body.mesh);
+    if (body.role == recording::Role::Source && !source) {
+      source = true;
+      // the lowest point of what was the rim, at the steepest pose
+      const Pose first = body.motion.at(recording.timestamps.front());
+      double steepest = 2;
+      Pose tilted = first;
+      for (const PoseTrack::Sample& sample : body.motion.samples()) {
+        const double upright = up.dot(sample.pose.rotation * (first.rotation.conjugate() * up));
+        if (upright < steepest) {
+          steepest = upright;
+          tilted = sample.pose;
+        }
+      }
+      double highest = -1e300;
+      for (const auto& vertex : body.mesh.vertices) {
+        highest = std::max(highest, up.dot(first * vertex));
+      }
+      double lowest = 1e300;
+      for (const auto& vertex : body.mesh.vertices) {
+        if (up.dot(first * vertex) > highest - 0.01) {
+          const Vector3<double> x = tilted * vertex;
+          if (up.dot(x) < lowest) {
+            lowest = up.dot(x);
+            lip = x;
+          }
+        }
+      }
+    }
+    if (body.role == recording::Role::Target && !target) {
+      target = true;
+      places.target = body.motion.at(recording.timestamps.front()) * surface.bounds().center();
+    }
+  }
+  places.jet = source && target ? Vector3<double>(0.5 * (lip + places.target)) : lip;
+  return places;
+}
+
+/// The catalogue, as far as it applies to a recording.
+inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording) {
+  using namespace decant;
+  auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density);
+  const PourPlaces places = pour_places(recording);
+  const Vector3<double> up = -recording.gravity.normalized();
+  const Vector3<double> across = up.unitOrthogonal(), along = up.cross(across);
+  const double aside = 0.08;  // [m]
+  effects.push_back(suction_effect<EffectModel>(places.jet + aside * across, "beside the jet, one side"));
+  effects.push_back(suction_effect<EffectModel>(places.jet - aside * across, "beside the jet, the other side"));
+  effects.push_back(suction_effect<EffectModel>(places.jet + aside * along, "beside the jet, behind"));
+  effects.push_back(suction_effect<EffectModel>(places.jet - aside * along, "beside the jet, in front"));
+  if (recording.liquid.initial) {
+    const double full = recording.liquid.initial->fill_fraction ? 1 / *recording.liquid.initial->fill_fraction : 1.25;
+    effects.push_back(fill_effect<EffectModel>(std::clamp(full, 1.05, 1.25)));
+  }
+  std::vector<std::string> names;
+  for (const recording::Body& body : recording.bodies) {
+    names.push_back(body.name);
+  }
+  for (auto& effect : measurement_effects<EffectModel>(names)) {
+    effects.push_back(std::move(effect));
+  }
+  return effects;
+}
+
+}  // namespace detail
+
+/// Throws std::invalid_argument and std::runtime_error for recordings without cameras or with an amount that is not
+/// known.
+inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
+  using namespace decant;
+  if (recording.cameras.empty()) {
+    throw std::runtime_error(recording.name + ": no camera: expected masks to compare a model with");
+  }
+  const std::vector<std::size_t> frames = detail::compared_frames(recording, options.frames_per_second);
+  InteractionScene<EffectModel, DistortedPinholeCamera> scene;
+  for (const std::size_t frame : frames) {
+    scene.times.push_back(recording.timestamps[frame]);
+  }
+  for (const recording::Body& body : recording.bodies) {
+    scene.motion.push_back(body.motion);
+  }
+  std::vector<SilhouetteSeries> seen;
+  const Vector3<double> middle = detail::pour_places(recording).jet;
+  for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
+    const recording::Camera& of = recording.cameras[camera];
+    InteractionCamera<DistortedPinholeCamera> one{camera_of(of.view(0), recording.width, recording.height), {}};
+    one.pixels_per_radian = of.view(0).fx;
+    one.distance = std::max(0.05, (of.view(0).camera_from_world * middle).z());
+    for (const std::size_t frame : frames) {
+      one.camera_from_world.push_back(of.view(frame).camera_from_world);
+    }
+    scene.cameras.push_back(std::move(one));
+    seen.push_back(detail::seen_by(recording, camera, frames, options.model.cell_px));
+  }
+  auto start_of = std::make_shared<Recording>(recording);
+  start_of->liquid.surface_tension = 0;
+  scene.start = [start_of](double spacing, double fill) {
+    TrackingOptions tracking;
+    tracking.spacing = spacing;
+    tracking.threads = 1;
+    tracking.initial_amount_factor = fill;
+    return model_of<EffectParts<float>>(*start_of, tracking);
+  };
+  RecordedModel model(std::move(scene), detail::catalogue_of(recording), options.model);
+  return {std::move(recording), std::move(model), std::move(seen)};
+}
+
+}  // namespace example

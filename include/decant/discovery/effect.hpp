@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What a model may lack, or what may be wrong with a measurement, told to people and to programs.
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/core/types.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// A number that says how strong an effect is: a drag has one, a sideways pull one for each direction.
+struct EffectComponent {
+  std::string name{};       ///< such as "x"; empty where there is one component only
+  double base = 0;          ///< what the model has
+  double low = 0;           ///< the range that is looked through, low <= base <= high, not both equal
+  double high = 1;          ///<
+  double tolerance = 0;     ///< up to so much off the base nothing is missing, >= 0: it is drawn with all else that is
+                            ///< tolerated; 0: the model is sure of it
+  bool saturating = false;  ///< more and more of it matters less and less, see StrengthLaw
+};
+
+/// What an effect is about.
+enum class EffectKind {
+  Physics,      ///< of the liquid, its surroundings or its amount
+  Measurement,  ///< late poses, a camera that was moved: the world is as the model has it
+  Nuisance  ///< a measurement's too, but only ever taken account of, not named: what it explains nothing else has to
+};
+
+/// An effect that a model can be given at any strength.
+struct Effect {
+  std::string name{};    ///< as scripts have it, such as "drag_linear"; several may have one name in different places
+  std::string family{};  ///< those of one family look alike in a single pour and count as one answer; the name if empty
+  std::string unit{};    ///< of all components
+  std::string meaning{};  ///< what it is, for people: "air slows the liquid in proportion to its speed"
+  std::vector<EffectComponent> components{1};  ///< one to three
+  EffectKind kind = EffectKind::Physics;
+  std::string where{};                     ///< the place in words, "floor of the cup"; empty if it has none
+  std::optional<Vector3<double>> place{};  ///< where it acts [m], in the model's own frame for it
+  double place_tolerance = 0;              ///< how far from there it may be as well [m]; 0: no other place is tried
+  std::string code{};  ///< the line of C++ that adds it to a simulator, with @ for each component's strength
+
+  /// The family, or the name where there is none.
+  const std::string& answer() const noexcept { return family.empty() ? name : family; }
+  /// For tables: the name and the place.
+  std::string words() const { return where.empty() ? name : name + ", " + where; }
+  Eigen::VectorXd base() const {
+    Eigen::VectorXd result(static_cast<Eigen::Index>(components.size()));
+    for (std::size_t k = 0; k < components.size(); ++k) {
+      result[static_cast<Eigen::Index>(k)] = components[k].base;
+    }
+    return result;
+  }
+};
+
+/// Throws std::invalid_argument if something is missing or out of range.
+inline void validate(const Effect& effect) {
+  const std::string of = "Effect '" + effect.name + "': ";
+  expects(!effect.name.empty(), "Effect: name", "one", "none");
+  expects(!effect.components.empty() && effect.components.size() <= 3, of + "components", "1 .. 3",
+          effect.components.size());
+  expects(effect.place_tolerance >= 0 && std::isfinite(effect.place_tolerance), of + "place_tolerance [m]", ">= 0",
+          effect.place_tolerance);
+  expects(!effect.place || effect.place->allFinite(), of + "place [m]", "finite", "others");
+  for (const EffectComponent& each : effect.components) {
+    expects(std::isfinite(each.low) && std::isfinite(each.high) && each.low <= each.base && each.base <= each.high &&
+                each.low < each.high,
+            of + "range", "finite, around the base", each.low);
+    expects(each.tolerance >= 0 && std::isfinite(each.tolerance), of + "tolerance", ">= 0", each.tolerance);
+  }
+}
+
+}  // namespace decant::inline DECANT_TARGET

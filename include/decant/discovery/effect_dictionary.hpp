@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Runs of a forward model that tell what each effect would change, and what differs anyway.
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// What a run is for.
+enum class RunRole {
+  Baseline,  ///< the model as it is
+  Draw,      ///< with all that is tolerated drawn at random
+  Template,  ///< with an error of measurement of one tolerance that is taken account of, not named
+  Effect     ///< with an effect at some strength
+};
+
+struct PlannedRun {
+  RunRole role = RunRole::Baseline;
+  std::size_t effect = 0;  ///< of templates and effects
+  ModelRun run{};
+};
+
+/// How many runs there are.
+struct DictionarySettings {
+  int baselines = 4;                      ///< >= 1
+  int draws = 20;                         ///< >= 5
+  std::vector<double> shares{0.35, 1.0};  ///< of the range to each side of an effect's base, in (0, 1]; at least one
+};
+
+/// The runs for all effects. Seeds follow from the run's number in its role, so that runs of one model and settings are
+/// the same ones whatever recording they are compared with.
+/// @param added effects that the model has been given already: all runs have them, but for those that are about one of
+/// them. Throws std::invalid_argument if settings are out of range.
+inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effects,
+                                               const DictionarySettings& settings = {},
+                                               const std::vector<AppliedEffect>& added = {}) {
+  expects(settings.baselines >= 1, "DictionarySettings: baselines", ">= 1", settings.baselines);
+  expects(settings.draws >= 5, "DictionarySettings: draws", ">= 5", settings.draws);
+  expects(!settings.shares.empty(), "DictionarySettings: shares", "at least one", "none");
+  for (const double share : settings.shares) {
+    expects(share > 0 && share <= 1, "DictionarySettings: share", "in (0, 1]", share);
+  }
+  std::vector<PlannedRun> runs;
+  for (int k = 0; k < settings.baselines; ++k) {
+    runs.push_back({RunRole::Baseline, 0, {added, static_cast<std::uint32_t>(k + 1), false}});
+  }
+  for (int k = 0; k < settings.draws; ++k) {
+    runs.push_back({RunRole::Draw, 0, {added, static_cast<std::uint32_t>(1001 + k), true}});
+  }
+  std::uint32_t seed = 2001;
+  for (std::size_t which = 0; which < effects.size(); ++which) {
+    const Effect& effect = effects[which];
+    validate(effect);
+    for (std::size_t component = 0; component < effect.components.size(); ++component) {
+      const EffectComponent& of = effect.components[component];
+      const auto add = [&](RunRole role, double strength, std::uint32_t with) {
+        AppliedEffect applied{which, effect.base(), {}};
+        applied.strength[static_cast<Eigen::Index>(component)] = strength;
+        PlannedRun planned{role, which, {added, with, false}};
+        std::erase_if(planned.run.effects, [which](const AppliedEffect& other) { return other.effect == which; });
+        planned.run.effects.push_back(std::move(applied));
+        runs.push_back(std::move(planned));
+      };
+      if (effect.kind == EffectKind::Nuisance) {
+        if (of.tolerance > 0) {
+          add(RunRole::Template, of.base + of.tolerance, 1);  // beside the first baseline
+        }
+        continue;
+      }
+      for (const double end : {of.low, of.high}) {
+        for (const double share : settings.shares) {
+          if (end != of.base) {
+            add(RunRole::Effect, of.base + share * (end - of.base), seed++);
+          }
+        }
+      }
+    }
+  }
+  return runs;
+}
+
+/// What a run depends on beside its model, as text: for journals.
+inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& run) {
+  const auto text = [](double value) {
+    char buffer[40];
+    std::snprintf(buffer, sizeof buffer, "%.17g", value);
+    return std::string(buffer);
+  };
+  std::string key = "seed " + std::to_string(run.seed) + (run.tolerated ? " tolerated" : "");
+  for (const AppliedEffect& applied : run.effects) {
+    const Effect& effect = effects.at(applied.effect);
+    key += ", " + effect.words() + " =";
+    for (const double strength : applied.strength) {
+      key += " " + text(strength);
+    }
+    if (applied.place) {
+      key += " at";
+      for (const double x : *applied.place) {
+        key += " " + text(x);
+      }
+    }
+  }
+  return key;
+}
+
+/// Runs with what they came to.
+struct EffectDictionary {
+  std::vector<Effect> effects{};
+  std::vector<PlannedRun> runs{};
+  std::vector<std::vector<SilhouetteSeries>> seen{};  ///< by run and camera; of runs that failed empty
+
+  bool worked(std::size_t run) const { return !seen.at(run).empty(); }
+  /// Numbers of the runs of a role that did not fail.
+  std::vector<std::size_t> of_role(RunRole role) const {
+    std::vector<std::size_t> which;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      if (runs[k].role == role && worked(k)) {
+        which.push_back(k);
+      }
+    }
+    return which;
+  }
+  /// Of those the ones of an effect.
+  std::vector<std::size_t> of_effect(std::size_t effect) const {
+    std::vector<std::size_t> which;
+    for (const std::size_t k : of_role(RunRole::Effect)) {
+      if (runs[k].effect == effect) {
+        which.push_back(k);
+      }
+    }
+    return which;
+  }
+  /// The strength of an effect's run.
+  const Eigen::VectorXd& strength(std::size_t run) const { return runs.at(run).run.effects.back().strength; }
+};
+
+}  // namespace decant::inline DECANT_TARGET

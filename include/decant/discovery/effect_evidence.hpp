@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What one recording says about each effect, and what a recording would say in which nothing is missing.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_curve.hpp>
+#include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/nuisance_space.hpp>
+#include <decant/discovery/silhouette_features.hpp>
+#include <decant/discovery/silhouette_gap.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/strength_profile.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// How a gap between silhouettes would shrink.
+struct GapGain {
+  double without = 0;        ///< the gap to the model as it is
+  std::vector<double> by{};  ///< by effect: by how much it would shrink at the best strength, >= 0
+};
+
+/// What a recording says.
+struct EffectEvidence {
+  double distance = 0;                                    ///< to the model as it is, as NuisanceSpace has it
+  std::vector<std::optional<StrengthProfile>> profile{};  ///< by effect; none where nothing is known of it
+  GapGain overlap{}, blurred{};                           ///< see overlap_gap and blurred_gap
+};
+
+/// Settings of RecordedEvidence.
+struct RecordedEvidenceSettings {
+  SilhouetteFeatureSettings features{};
+  NuisanceSettings nuisance{};
+};
+
+/// Compares a recording with a dictionary of the same interaction.
+class RecordedEvidence {
+ public:
+  using Series = std::vector<SilhouetteSeries>;
+
+  /// @param recording by camera. @param dictionary has to outlive it. @param references features of recordings without
+  /// hidden effects are not known here yet: see NuisanceSample.
+  /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras or frames are others.
+  RecordedEvidence(Series recording, const EffectDictionary& dictionary, const RecordedEvidenceSettings& settings = {})
+      : recording_(std::move(recording)),
+        dictionary_(&dictionary),
+        settings_(settings),
+        features_(recording_, working(dictionary), settings.features) {
+    const std::vector<std::size_t> baselines = dictionary.of_role(RunRole::Baseline);
+    draws_ = dictionary.of_role(RunRole::Draw);
+    expects(!baselines.empty(), "RecordedEvidence: baselines that worked", "at least one", "none");
+    expects(draws_.size() >= 5, "RecordedEvidence: draws that worked", "at least 5", draws_.size());
+    expects(features_.size() > 0, "RecordedEvidence: liquid in the recording or in runs", "some", "none");
+    for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
+      if (dictionary.worked(run)) {
+        of_run_[run] = features_.of(dictionary.seen[run]);
+      }
+    }
+    const auto columns = [&](const std::vector<std::size_t>& runs) {
+      Eigen::MatrixXd result(static_cast<Eigen::Index>(features_.size()), static_cast<Eigen::Index>(runs.size()));
+      for (std::size_t k = 0; k < runs.size(); ++k) {
+        result.col(static_cast<Eigen::Index>(k)) = of_run_.at(runs[k]);
+      }
+      return result;
+    };
+    sample_.baseline = columns(baselines);
+    sample_.draws = columns(draws_);
+    // Templates begin as the first baseline does, so that they differ from it by the error of measurement alone.
+    if (baselines.front() == 0) {
+      sample_.templates = columns(dictionary.of_role(RunRole::Template)).colwise() - of_run_.at(0);
+    }
+    sample_.references.resize(sample_.draws.rows(), 0);
+    space_ = std::make_unique<NuisanceSpace>(sample_, settings.nuisance);
+  }
+
+  const SilhouetteFeatures& features() const noexcept { return features_; }
+  const NuisanceSpace& space() const noexcept { return *space_; }
+  std::size_t draws() const noexcept { return draws_.size(); }
+
+  /// How far the recording is off what is expected, by feature, in standard deviations.
+  Eigen::VectorXd standardised() const { return space_->standardised(features_.of(recording_)); }
+  Eigen::VectorXd recorded_features() const { return features_.of(recording_); }
+  const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
+
+  /// What the recording says.
+  EffectEvidence of_recording() const { return evidence(recording_, features_.of(recording_), *space_); }
+
+  /// What one of the draws would say as the recording, to a dictionary that does not have it.
+  EffectEvidence of_draw(std::size_t draw) const {
+    const std::size_t run = draws_.at(draw);
+    const NuisanceSpace rest(sample_.without_draw(static_cast<Eigen::Index>(draw)), settings_.nuisance);
+    return evidence(dictionary_->seen[run], of_run_.at(run), rest);
+  }
+
+ private:
+  static std::vector<Series> working(const EffectDictionary& dictionary) {
+    std::vector<Series> result;
+    for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
+      if (dictionary.worked(run)) {
+        result.push_back(dictionary.seen[run]);
+      }
+    }
+    return result;
+  }
+
+  /// Numbers of the effect's runs, if they say something of each component.
+  std::vector<std::size_t> telling_runs(std::size_t effect) const {
+    const Effect& of = dictionary_->effects[effect];
+    std::vector<std::size_t> runs =
+        of.kind == EffectKind::Nuisance ? std::vector<std::size_t>() : dictionary_->of_effect(effect);
+    for (std::size_t component = 0; component < of.components.size(); ++component) {
+      if (std::none_of(runs.begin(), runs.end(), [&](std::size_t run) {
+            return dictionary_->strength(run)[static_cast<Eigen::Index>(component)] != of.components[component].base;
+          })) {
+        return {};
+      }
+    }
+    return runs;
+  }
+
+  EffectEvidence evidence(const Series& seen, const Eigen::VectorXd& features, const NuisanceSpace& space) const {
+    EffectEvidence result;
+    const Eigen::VectorXd standardised = space.standardised(features);
+    result.distance = space.distance(standardised);
+    const auto overlap = [&](const Series& other) { return overlap_gap(seen, other); };
+    const auto blurred = [&](const Series& other) { return blurred_gap(seen, other); };
+    result.overlap.without = baseline_gap(overlap);
+    result.blurred.without = baseline_gap(blurred);
+    for (std::size_t effect = 0; effect < dictionary_->effects.size(); ++effect) {
+      const std::vector<std::size_t> runs = telling_runs(effect);
+      result.profile.emplace_back();
+      result.overlap.by.push_back(0);
+      result.blurred.by.push_back(0);
+      if (runs.empty()) {
+        continue;
+      }
+      result.profile.back() = curve(effect, runs, space).profile(standardised);
+      result.overlap.by.back() = gain(effect, runs, result.overlap.without, overlap);
+      result.blurred.by.back() = gain(effect, runs, result.blurred.without, blurred);
+    }
+    return result;
+  }
+
+  EffectCurve curve(std::size_t effect, const std::vector<std::size_t>& runs, const NuisanceSpace& space) const {
+    std::vector<StrengthBase> components;
+    for (const EffectComponent& each : dictionary_->effects[effect].components) {
+      components.push_back({each.base, each.saturating});
+    }
+    std::vector<Eigen::VectorXd> strengths;
+    Eigen::MatrixXd differences(space.features(), static_cast<Eigen::Index>(runs.size()));
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      strengths.push_back(dictionary_->strength(runs[k]));
+      differences.col(static_cast<Eigen::Index>(k)) = of_run_.at(runs[k]) - space.center();
+    }
+    return EffectCurve(space, components, strengths, differences);
+  }
+
+  template <class Gap>
+  double baseline_gap(const Gap& gap) const {
+    double sum = 0;
+    const std::vector<std::size_t> runs = dictionary_->of_role(RunRole::Baseline);
+    for (const std::size_t run : runs) {
+      sum += gap(dictionary_->seen[run]);
+    }
+    return sum / static_cast<double>(runs.size());
+  }
+
+  /// The gap follows the same law of the strength as features do.
+  template <class Gap>
+  double gain(std::size_t effect, const std::vector<std::size_t>& runs, double without, const Gap& gap) const {
+    const Effect& of = dictionary_->effects[effect];
+    double total = 0;
+    for (std::size_t component = 0; component < of.components.size(); ++component) {
+      const EffectComponent& with = of.components[component];
+      std::vector<double> strength, shrunk;
+      double low = with.base, high = with.base;
+      for (const std::size_t run : runs) {
+        const double s = dictionary_->strength(run)[static_cast<Eigen::Index>(component)];
+        if (s != with.base) {
+          strength.push_back(s);
+          shrunk.push_back(without - gap(dictionary_->seen[run]));
+          low = std::min(low, s);
+          high = std::max(high, s);
+        }
+      }
+      const StrengthLaw law{with.base, std::max(high - with.base, with.base - low), with.saturating};
+      const Eigen::Index terms = strength.size() > 1 ? 2 : 1;
+      Eigen::MatrixXd at(static_cast<Eigen::Index>(strength.size()), terms);
+      for (std::size_t k = 0; k < strength.size(); ++k) {
+        const std::array<double, 2> both = law(strength[k]);
+        for (Eigen::Index term = 0; term < terms; ++term) {
+          at(static_cast<Eigen::Index>(k), term) = both[static_cast<std::size_t>(term)];
+        }
+      }
+      const Eigen::VectorXd c =
+          (at.transpose() * at)
+              .ldlt()
+              .solve(at.transpose() * Eigen::Map<const Eigen::VectorXd>(shrunk.data(), at.rows()));
+      double best = 0;
+      for (int step = 0; step <= 40; ++step) {
+        const std::array<double, 2> both = law(low + step * (high - low) / 40);
+        best = std::max(best, c[0] * both[0] + (terms > 1 ? c[1] * both[1] : 0));
+      }
+      total += best;
+    }
+    return total;
+  }
+
+  Series recording_;
+  const EffectDictionary* dictionary_;
+  RecordedEvidenceSettings settings_;
+  SilhouetteFeatures features_;
+  std::vector<std::size_t> draws_{};
+  std::map<std::size_t, Eigen::VectorXd> of_run_{};
+  NuisanceSample sample_{};
+  std::unique_ptr<NuisanceSpace> space_{};
+};
+
+}  // namespace decant::inline DECANT_TARGET

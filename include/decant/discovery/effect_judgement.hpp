@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Which effect is missing, if one is: all of them judged by what recordings say, against what chance says.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_evidence.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// What chance does where nothing is missing, by draws left out.
+struct ChanceLevel {
+  double distance = 0;              ///< mean of draws
+  double largest_distance = 0;      ///< beyond it something is off that is not tolerated
+  double improvement = 0;           ///< of the distance by any effect: what is larger is no chance
+  double overlap = 0, blurred = 0;  ///< the same of the gaps, over the gap itself
+};
+
+/// Factors on what the draws' worst was.
+struct JudgementSettings {
+  double distance_factor = 1.1;     ///< >= 1
+  double improvement_factor = 1.3;  ///< >= 1
+  double gap_factor = 1.3;          ///< >= 1
+  double least_share = 0.6;   ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
+  double vote_margin = 0.15;  ///< families this close to the best are not told apart; 0 .. 1
+};
+
+/// An effect, as recordings together see it.
+struct EffectStanding {
+  std::size_t effect = 0;
+  Eigen::VectorXd strength{};                         ///< at which it explains most
+  std::vector<std::pair<double, double>> interval{};  ///< by component: strengths that chance cannot tell from it
+  double distance = 0;                                ///< that is left then
+  double improvement = 0;                             ///< of the distance
+  double share = 0;                                   ///< of what is reducible: the distance beyond chance's mean
+  double vote = 0;                                    ///< over all gaps, 1 for the best of each; no probability
+};
+
+/// What is answered.
+enum class Verdict {
+  Nothing,      ///< no gap beyond what is tolerated
+  Named,        ///< one effect, or one family
+  OneOf,        ///< one of several that these recordings do not tell apart
+  Unexplained,  ///< there is a gap, and no effect of the catalogue explains it
+};
+
+struct Judgement {
+  Verdict verdict = Verdict::Nothing;
+  std::vector<std::size_t> named{};  ///< numbers in `standings` of what is answered, by vote; the nearest one where the
+                                     ///< gap is unexplained
+  std::vector<EffectStanding> standings{};  ///< all that something is known of, the best first
+  double distance = 0;                      ///< of the model as it is
+  ChanceLevel chance{};
+  bool has_gap() const noexcept { return distance > chance.largest_distance || improvement() > chance.improvement; }
+  /// The largest of any effect.
+  double improvement() const noexcept {
+    double best = 0;
+    for (const EffectStanding& each : standings) {
+      best = std::max(best, each.improvement);
+    }
+    return best;
+  }
+};
+
+namespace detail {
+
+/// Evidence of several recordings with one and the same effect: means.
+struct JointEvidence {
+  double distance = 0;
+  std::vector<std::optional<StrengthProfile>> profile{};  ///< sums; divide by the number of recordings
+  std::vector<double> overlap{}, blurred{};               ///< by effect, over the gap
+};
+
+inline JointEvidence joined(const std::vector<EffectEvidence>& of) {
+  expects(!of.empty(), "judge_effects: recordings", "at least one", "none");
+  JointEvidence result;
+  const auto count = static_cast<double>(of.size());
+  const std::size_t effects = of.front().profile.size();
+  result.profile = of.front().profile;
+  result.overlap.assign(effects, 0);
+  result.blurred.assign(effects, 0);
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    expects(of[k].profile.size() == effects, "judge_effects: effects of a recording", "those of the first one",
+            of[k].profile.size());
+    result.distance += of[k].distance / count;
+    for (std::size_t effect = 0; effect < effects; ++effect) {
+      if (k > 0) {
+        if (result.profile[effect] && of[k].profile[effect]) {
+          *result.profile[effect] += *of[k].profile[effect];
+        } else {
+          result.profile[effect].reset();
+        }
+      }
+      result.overlap[effect] += of[k].overlap.by[effect] / std::max(of[k].overlap.without, 1e-12) / count;
+      result.blurred[effect] += of[k].blurred.by[effect] / std::max(of[k].blurred.without, 1e-12) / count;
+    }
+  }
+  return result;
+}
+
+inline double largest(const std::vector<double>& values) noexcept {
+  double best = 0;
+  for (const double value : values) {
+    best = std::max(best, value);
+  }
+  return best;
+}
+
+}  // namespace detail
+
+/// What chance does. @param draws by recording and draw: what each draw left out says.
+inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& draws,
+                                const JudgementSettings& settings = {}) {
+  expects(!draws.empty(), "chance_level: recordings", "at least one", "none");
+  std::size_t count = draws.front().size();
+  for (const auto& each : draws) {
+    count = std::min(count, each.size());
+  }
+  expects(count >= 5, "chance_level: draws", "at least 5", count);
+  ChanceLevel level;
+  for (std::size_t draw = 0; draw < count; ++draw) {
+    std::vector<EffectEvidence> of;
+    for (const auto& each : draws) {
+      of.push_back(each[draw]);
+    }
+    const detail::JointEvidence joint = detail::joined(of);
+    const auto recordings = static_cast<double>(of.size());
+    level.distance += joint.distance / static_cast<double>(count);
+    level.largest_distance = std::max(level.largest_distance, settings.distance_factor * joint.distance);
+    for (const auto& profile : joint.profile) {
+      if (profile) {
+        level.improvement =
+            std::max(level.improvement, settings.improvement_factor * profile->improvement() / recordings);
+      }
+    }
+    level.overlap = std::max(level.overlap, settings.gap_factor * detail::largest(joint.overlap));
+    level.blurred = std::max(level.blurred, settings.gap_factor * detail::largest(joint.blurred));
+  }
+  return level;
+}
+
+/// Judges effects by what one or more recordings say, all of which have the effect at one strength.
+/// The vote: the improvement of the distance, twice, and those of the gaps, each over the best effect's; a gap is asked
+/// only if it shrinks by more than chance makes it.
+/// @param effects in the order of the evidence. Throws std::invalid_argument if evidence does not fit.
+inline Judgement judge_effects(const std::vector<Effect>& effects, const std::vector<EffectEvidence>& recordings,
+                               const ChanceLevel& chance, const JudgementSettings& settings = {}) {
+  const detail::JointEvidence joint = detail::joined(recordings);
+  expects(joint.profile.size() == effects.size(), "judge_effects: effects", "as many as in the evidence",
+          effects.size());
+  const auto count = static_cast<double>(recordings.size());
+  Judgement result;
+  result.chance = chance;
+  result.distance = joint.distance;
+  const double best_overlap = detail::largest(joint.overlap), best_blurred = detail::largest(joint.blurred);
+  double best_improvement = 0;
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    if (!joint.profile[k]) {
+      continue;
+    }
+    const StrengthProfile& profile = *joint.profile[k];
+    EffectStanding one;
+    one.effect = k;
+    one.strength = profile.best();
+    one.improvement = profile.improvement() / count;
+    one.distance = joint.distance - one.improvement;
+    one.share = one.improvement / std::max(joint.distance - chance.distance, 1e-12);
+    for (std::size_t component = 0; component < profile.components(); ++component) {
+      one.interval.push_back(profile.within(component, std::max(chance.improvement, 1e-9) * count));
+    }
+    best_improvement = std::max(best_improvement, one.improvement);
+    result.standings.push_back(std::move(one));
+  }
+  for (EffectStanding& one : result.standings) {
+    double votes = 2;
+    one.vote = 2 * one.improvement / std::max(best_improvement, 1e-12);
+    const auto ask = [&](double by, double best, double by_chance) {
+      if (best > by_chance) {
+        one.vote += by / best;
+        votes += 1;
+      }
+    };
+    ask(joint.overlap[one.effect], best_overlap, chance.overlap);
+    ask(joint.blurred[one.effect], best_blurred, chance.blurred);
+    one.vote /= votes;
+  }
+  std::stable_sort(result.standings.begin(), result.standings.end(),
+                   [](const auto& a, const auto& b) { return a.vote > b.vote; });
+  if (result.standings.empty()) {
+    result.verdict = result.distance > chance.largest_distance ? Verdict::Unexplained : Verdict::Nothing;
+    return result;
+  }
+  if (!result.has_gap()) {
+    return result;
+  }
+  const EffectStanding& best = result.standings.front();
+  result.named.push_back(0);
+  const bool improves = best.improvement > chance.improvement;
+  const bool explains = best.share >= settings.least_share || best.distance <= chance.largest_distance;
+  if (!improves || !explains) {
+    result.verdict = Verdict::Unexplained;
+    return result;
+  }
+  std::set<std::string> answers{effects[best.effect].answer()};
+  for (std::size_t k = 1; k < result.standings.size(); ++k) {
+    const EffectStanding& other = result.standings[k];
+    if (other.vote >= best.vote - settings.vote_margin && other.improvement > chance.improvement) {
+      if (answers.insert(effects[other.effect].answer()).second) {
+        result.named.push_back(k);
+      }
+    }
+  }
+  result.verdict = answers.size() > 1 ? Verdict::OneOf : Verdict::Named;
+  return result;
+}
+
+}  // namespace decant::inline DECANT_TARGET

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The strength of an effect, and its place where it has one, by runs around what the dictionary says.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/core/types.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/nuisance_space.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// A guess of strengths and places of one or more effects as one vector: of each effect its components, then its
+/// place's three coordinates [m], if it has one that is looked for.
+class EffectPoint {
+ public:
+  /// Takes one more effect. @param effect has to outlive the point. @param number of it among the model's effects.
+  /// @param guess to begin with. Throws std::invalid_argument for another number of components.
+  void add(const Effect& effect, std::size_t number, const AppliedEffect& guess) {
+    const auto components = static_cast<Eigen::Index>(effect.components.size());
+    expects(guess.strength.size() == components, "EffectPoint: strength", "a number for each component",
+            guess.strength.size());
+    const bool placed = effect.place.has_value() && effect.place_tolerance > 0;
+    parts_.push_back({&effect, number, value_.size(), components, placed});
+    value_.conservativeResize(value_.size() + components + (placed ? 3 : 0));
+    value_.segment(parts_.back().begin, components) = guess.strength;
+    if (placed) {
+      value_.tail<3>() = guess.place.value_or(*effect.place);
+    }
+  }
+
+  Eigen::Index size() const noexcept { return value_.size(); }
+  const Eigen::VectorXd& value() const noexcept { return value_; }
+  std::size_t effects() const noexcept { return parts_.size(); }
+  /// Which numbers of the vector are an effect's strength: the first one, and how many.
+  std::pair<Eigen::Index, Eigen::Index> strength_of(std::size_t part) const {
+    return {parts_.at(part).begin, parts_.at(part).components};
+  }
+  AppliedEffect applied(std::size_t part) const {
+    const Part& of = parts_.at(part);
+    AppliedEffect result{of.number, value_.segment(of.begin, of.components), {}};
+    if (of.placed) {
+      result.place = value_.segment<3>(of.begin + of.components);
+    }
+    return result;
+  }
+
+  /// How far off a number is tried to see what it changes.
+  double step(Eigen::Index k) const {
+    const Part& of = part_of(k);
+    if (k >= of.begin + of.components) {
+      return 0.4 * of.effect->place_tolerance;
+    }
+    const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
+    return std::max(0.3 * std::abs(value_[k] - component.base), 0.05 * (component.high - component.low));
+  }
+  /// The range of a number: strengths may be half as large again as those that are looked through at first.
+  std::pair<double, double> range(Eigen::Index k) const {
+    const Part& of = part_of(k);
+    if (k >= of.begin + of.components) {
+      const double middle = (*of.effect->place)[k - of.begin - of.components];
+      return {middle - of.effect->place_tolerance, middle + of.effect->place_tolerance};
+    }
+    const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
+    return {component.base + 1.5 * (component.low - component.base),
+            component.base + 1.5 * (component.high - component.base)};
+  }
+  /// The same with one number changed, kept in its range.
+  EffectPoint with(Eigen::Index k, double value) const {
+    EffectPoint other = *this;
+    const auto [low, high] = range(k);
+    other.value_[k] = std::clamp(value, low, high);
+    return other;
+  }
+
+  ModelRun run(std::uint32_t seed) const {
+    ModelRun result{{}, seed, false};
+    for (std::size_t part = 0; part < parts_.size(); ++part) {
+      result.effects.push_back(applied(part));
+    }
+    return result;
+  }
+
+ private:
+  struct Part {
+    const Effect* effect;
+    std::size_t number;
+    Eigen::Index begin, components;
+    bool placed;
+  };
+
+  const Part& part_of(Eigen::Index k) const {
+    std::size_t part = 0;
+    while (part + 1 < parts_.size() && k >= parts_[part + 1].begin) {
+      ++part;
+    }
+    return parts_.at(part);
+  }
+
+  std::vector<Part> parts_{};
+  Eigen::VectorXd value_{};
+};
+
+/// What a recording's simulations say around a point. Features are as they are, not standardised.
+struct RefinementView {
+  const NuisanceSpace* space = nullptr;
+  Eigen::VectorXd middle{};  ///< at the point
+  Eigen::MatrixXd slope{};   ///< p x size of the point: what a change of one unit does
+};
+
+/// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
+/// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
+/// No number moves more than two of its steps, nor out of its range.
+inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<RefinementView>& views,
+                                  const std::vector<Eigen::VectorXd>& features) {
+  expects(!views.empty() && features.size() == views.size(), "refinement: features", "those of each recording",
+          features.size());
+  const Eigen::Index size = at.size();
+  Eigen::MatrixXd curvature = Eigen::MatrixXd::Zero(size, size);
+  Eigen::VectorXd answer = Eigen::VectorXd::Zero(size), unit(size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    unit[k] = at.step(k);
+  }
+  for (std::size_t which = 0; which < views.size(); ++which) {
+    const RefinementView& view = views[which];
+    const Eigen::VectorXd off = view.space->standardised_difference(features[which] - view.middle);
+    std::vector<Eigen::VectorXd> slope;
+    for (Eigen::Index k = 0; k < size; ++k) {
+      slope.push_back(view.space->standardised_difference(unit[k] * view.slope.col(k)));
+    }
+    for (Eigen::Index i = 0; i < size; ++i) {
+      answer[i] += view.space->inner(off, slope[static_cast<std::size_t>(i)]);
+      for (Eigen::Index j = 0; j < size; ++j) {
+        curvature(i, j) += view.space->inner(slope[static_cast<std::size_t>(i)], slope[static_cast<std::size_t>(j)]);
+      }
+    }
+  }
+  // what changes nothing stays where it is
+  curvature.diagonal().array() += 1e-2 * curvature.diagonal().maxCoeff() + 1e-12;
+  Eigen::VectorXd move = curvature.ldlt().solve(answer);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const auto [low, high] = at.range(k);
+    move[k] = std::clamp(at.value()[k] + unit[k] * std::clamp(move[k], -2.0, 2.0), low, high) - at.value()[k];
+  }
+  return move;
+}
+
+}  // namespace decant::inline DECANT_TARGET

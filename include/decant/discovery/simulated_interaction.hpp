@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The forward model that ships: a liquid simulation among bodies that move as they were recorded to, open loop, drawn
+/// as cameras would see it, with effects added.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <random>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/image.hpp>
+#include <decant/core/pose.hpp>
+#include <decant/core/target.hpp>
+#include <decant/core/types.hpp>
+#include <decant/correction/open_loop.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+#include <decant/tracking/tracker.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// A camera of an interaction.
+template <class CameraType>
+struct InteractionCamera {
+  CameraType camera;
+  std::vector<Pose> camera_from_world;  ///< of each frame that is compared
+  double pixels_per_radian = 500;       ///< the focal length [px]: what a turn of the camera shifts its picture by
+  double distance = 1;                  ///< about how far off the liquid is [m]
+};
+
+/// How an interaction went, as far as it was recorded.
+template <class Model, class CameraType>
+struct InteractionScene {
+  /// Makes the simulation with its bodies where they are at first, and settled liquid. @param spacing of particles [m].
+  /// @param fill how much liquid, over what the model assumes. Bodies' poses are as of times.front().
+  std::function<Model(double spacing, double fill)> start{};
+  std::vector<PoseTrack> motion{};  ///< of each body, on the recording's clock
+  std::vector<InteractionCamera<CameraType>> cameras{};
+  std::vector<double> times{};  ///< of the frames that are compared, on the recording's clock [s]
+};
+
+/// What effects can change about a run.
+template <class Model>
+struct InteractionChanges {
+  double fill = 1;                                      ///< over what the model assumes
+  double pose_delay = 0;                                ///< poses were recorded so late [s]
+  std::vector<Vector3<double>> body_offset{};           ///< by body: where it is off its recorded pose [m], world frame
+  Eigen::Vector2d camera_shift{0, 0};                   ///< of the picture [px]
+  double camera_roll = 0;                               ///< of the picture about its middle, clockwise [rad]
+  double mask_growth = 0;                               ///< of silhouettes on all sides [px]
+  std::vector<std::function<void(Model&)>> of_model{};  ///< done to the model before it starts
+};
+
+/// An effect, and what it does to a run.
+/// apply(strength, place, changes): strength by component, place as Effect::place or as it is asked for.
+template <class Model>
+struct InteractionEffect : Effect {
+  std::function<void(const Eigen::VectorXd& strength, const Vector3<double>& place, InteractionChanges<Model>& changes)>
+      apply{};
+};
+
+/// Settings of SimulatedInteraction.
+struct SimulatedInteractionSettings {
+  double spacing = 0.005;                                 ///< of the model's particles [m], > 0
+  std::vector<double> tolerated_spacings{0.94, 1, 1.06};  ///< over it, one of which is drawn where all is tolerated
+  double jitter = 0.05;            ///< of particles where they start, over their spacing, 0 .. 0.3
+  int cell_px = 10;                ///< of silhouettes
+  double longest_step = 1.0 / 60;  ///< for which the model is told to run at a time [s], > 0
+};
+
+/// Runs of a liquid simulation, as ForwardModel has it. The settled liquid at the start is made once for each spacing
+/// and amount of liquid. Runs of different seeds begin with particles that are shifted a little: liquid in free fall
+/// does the rest.
+template <class Model, class CameraType>
+class SimulatedInteraction {
+ public:
+  using Scene = InteractionScene<Model, CameraType>;
+  using Changes = InteractionChanges<Model>;
+
+  /// Throws std::invalid_argument if something is missing, or a setting is out of range.
+  SimulatedInteraction(Scene scene, std::vector<InteractionEffect<Model>> effects,
+                       const SimulatedInteractionSettings& settings = {})
+      : scene_(std::move(scene)), settings_(settings), starts_(std::make_shared<Starts>()) {
+    expects(static_cast<bool>(scene_.start), "SimulatedInteraction: start", "a function", "none");
+    expects(!scene_.times.empty(), "SimulatedInteraction: times", "at least one frame", "none");
+    for (std::size_t k = 0; k < scene_.times.size(); ++k) {
+      expects(std::isfinite(scene_.times[k]) && (k == 0 || scene_.times[k] > scene_.times[k - 1]),
+              "SimulatedInteraction: time [s]", "finite and increasing", scene_.times[k]);
+    }
+    for (const auto& camera : scene_.cameras) {
+      expects(camera.camera_from_world.size() == scene_.times.size(), "SimulatedInteraction: poses of a camera",
+              "one for each frame", camera.camera_from_world.size());
+    }
+    expects(settings.spacing > 0, "SimulatedInteraction: spacing [m]", "> 0", settings.spacing);
+    expects(!settings.tolerated_spacings.empty(), "SimulatedInteraction: tolerated_spacings", "at least one", "none");
+    expects(settings.jitter >= 0 && settings.jitter <= 0.3, "SimulatedInteraction: jitter", "0 .. 0.3",
+            settings.jitter);
+    expects(settings.longest_step > 0, "SimulatedInteraction: longest_step [s]", "> 0", settings.longest_step);
+    for (InteractionEffect<Model>& effect : effects) {
+      validate(effect);
+      expects(static_cast<bool>(effect.apply), "Effect '" + effect.name + "': apply", "a function", "none");
+      apply_.push_back(std::move(effect.apply));
+      effects_.push_back(std::move(effect));
+    }
+  }
+
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  const Scene& scene() const noexcept { return scene_; }
+  const SimulatedInteractionSettings& settings() const noexcept { return settings_; }
+
+  /// What a run starts with: all that it changes, and over the settings' spacing, its own.
+  std::pair<Changes, double> changes(const ModelRun& run) const {
+    std::pair<Changes, double> result;
+    auto& [changes, spacing] = result;
+    changes.body_offset.assign(scene_.motion.size(), Vector3<double>::Zero());
+    spacing = 1;
+    std::vector<Eigen::VectorXd> strength;
+    for (const Effect& effect : effects_) {
+      strength.push_back(effect.base());
+    }
+    if (run.tolerated) {
+      std::mt19937 random(run.seed);
+      const auto draw = [&] { return static_cast<double>(random()) / 4294967295.0; };  // 0 .. 1
+      const auto which = static_cast<std::size_t>(draw() * static_cast<double>(settings_.tolerated_spacings.size()));
+      spacing = settings_.tolerated_spacings[std::min(which, settings_.tolerated_spacings.size() - 1)];
+      for (std::size_t k = 0; k < effects_.size(); ++k) {
+        for (std::size_t component = 0; component < effects_[k].components.size(); ++component) {
+          const EffectComponent& of = effects_[k].components[component];
+          if (of.tolerance > 0 && effects_[k].kind != EffectKind::Nuisance) {
+            strength[k][static_cast<Eigen::Index>(component)] =
+                std::clamp(of.base + (2 * draw() - 1) * of.tolerance, of.low, of.high);
+          }
+        }
+      }
+    }
+    std::vector<Vector3<double>> place;
+    for (const Effect& effect : effects_) {
+      place.push_back(effect.place.value_or(Vector3<double>::Zero()));
+    }
+    for (const AppliedEffect& applied : run.effects) {
+      expects(applied.effect < effects_.size(), "ModelRun: effect", "one of the model's", applied.effect);
+      const Effect& effect = effects_[applied.effect];
+      expects(applied.strength.size() == static_cast<Eigen::Index>(effect.components.size()) &&
+                  applied.strength.allFinite(),
+              "ModelRun: strength of '" + effect.name + "'", "a finite number for each component",
+              applied.strength.size());
+      strength[applied.effect] = applied.strength;
+      place[applied.effect] = applied.place.value_or(place[applied.effect]);
+    }
+    for (std::size_t k = 0; k < effects_.size(); ++k) {
+      if (strength[k] != effects_[k].base()) {
+        apply_[k](strength[k], place[k], changes);
+      }
+    }
+    return result;
+  }
+
+  /// The model of a run as it starts: its clock stands at what is the first frame's time, its bodies are in motion.
+  Model started(const ModelRun& run) const {
+    const auto [changes, spacing] = this->changes(run);
+    return started(changes, spacing * settings_.spacing, run.seed);
+  }
+
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    const auto [changes, spacing] = this->changes(run);
+    Model model = started(changes, spacing * settings_.spacing, run.seed);
+    std::vector<Eye> eyes;
+    for (const auto& camera : scene_.cameras) {
+      eyes.push_back(eye(camera, changes, model));
+    }
+    const double start = model.time() - scene_.times.front();
+    for (std::size_t frame = 0; frame < scene_.times.size(); ++frame) {
+      const double until = start + scene_.times[frame];
+      while (model.time() < until - 1e-9) {
+        if (!model.step(std::min(settings_.longest_step, until - model.time())).advanced()) {
+          return {};
+        }
+      }
+      for (std::size_t k = 0; k < eyes.size(); ++k) {
+        eyes[k].picture.predict(model, 0, eyes[k].turn * scene_.cameras[k].camera_from_world[frame], eyes[k].mask);
+        eyes[k].seen.add(scene_.times[frame], eyes[k].mask);
+      }
+    }
+    std::vector<SilhouetteSeries> seen;
+    for (Eye& each : eyes) {
+      seen.push_back(std::move(each.seen));
+    }
+    return seen;
+  }
+
+ private:
+  using Picture = Tracker<Model, OpenLoop<typename Model::Scalar, CameraType>, CameraType>;
+
+  /// A tracker's drawing, without its tracking.
+  struct Eye {
+    Picture picture;
+    Pose turn;
+    Mask mask;
+    SilhouetteSeries seen;
+  };
+
+  Eye eye(const InteractionCamera<CameraType>& camera, const Changes& changes, const Model& model) const {
+    TrackerSettings drawing;
+    drawing.threads = model.settings().threads;
+    const double grown = changes.mask_growth * camera.distance / camera.pixels_per_radian;  // [m]
+    drawing.sphere_in_spacings = std::max(0.1, drawing.sphere_in_spacings + grown / model.spacing());
+    const Eigen::Vector2d angle = changes.camera_shift / camera.pixels_per_radian;
+    const Eigen::Quaterniond turn = Eigen::AngleAxisd(changes.camera_roll, Eigen::Vector3d::UnitZ()) *
+                                    Eigen::AngleAxisd(angle.x(), Eigen::Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(-angle.y(), Eigen::Vector3d::UnitX());
+    Eye result{Picture(model, {}, drawing),
+               {turn, Vector3<double>::Zero()},
+               Mask(),
+               SilhouetteSeries(camera.camera.width(), camera.camera.height(), settings_.cell_px)};
+    result.picture.add_camera(camera.camera, camera.camera_from_world.front());
+    return result;
+  }
+
+  /// Where a body is at a time of the recording.
+  Pose pose_of(std::size_t body, double time, const Changes& changes) const {
+    Pose pose = scene_.motion[body].at(time + changes.pose_delay);
+    pose.translation += changes.body_offset[body];
+    return pose;
+  }
+
+  Model started(const Changes& changes, double spacing, std::uint32_t seed) const {
+    const Model& start = settled(spacing, changes.fill);
+    const std::vector<Index> kept = lowest(start, amount_of(const_cast<Model&>(start).fluid(), changes.fill));
+    Model model = start;
+    const std::size_t bodies = scene_.motion.size();
+    expects(model.bodies().size() >= bodies, "SimulatedInteraction: bodies of the model",
+            "at least as many as there are motions", model.bodies().size());
+    // Bodies start elsewhere with what is in them: liquid is taken out, moved along and put back.
+    const auto before = model.fluid();
+    model.remove_particles_if([](Index) { return true; });
+    const double now = model.time(), first = scene_.times.front();
+    std::vector<Pose> moved;
+    for (std::size_t body = 0; body < bodies; ++body) {
+      const auto id = static_cast<BodyId>(body);
+      const Pose from = model.bodies()[id].motion.at(now), to = pose_of(body, first, changes);
+      moved.push_back(to * from.inverse());
+      std::vector<PoseTrack::Sample> samples{{now, to}};
+      for (const PoseTrack::Sample& sample : scene_.motion[body].samples()) {
+        const double time = sample.time - changes.pose_delay;
+        if (time > first + 1e-9) {
+          samples.push_back({time - first + now, pose_of(body, time, changes)});
+        }
+      }
+      model.set_motion(id, PoseTrack(std::move(samples)));
+    }
+    std::mt19937 random(seed);
+    const auto shake = [&] { return settings_.jitter * spacing * (static_cast<double>(random()) / 2147483648.0 - 1); };
+    using Scalar = typename Model::Scalar;
+    PointArray<Scalar> place(3, 1);
+    for (const Index i : kept) {
+      Vector3<double> x = before.position.col(i).template cast<double>();
+      const std::size_t origin = before.origin[i];
+      if (origin < bodies) {
+        x = moved[origin] * x;
+      }
+      for (int axis = 0; axis < 3; ++axis) {
+        x[axis] += shake();
+      }
+      place.col(0) = x.template cast<Scalar>();
+      model.add_particles(place, PointArray<Scalar>::Zero(3, 1), before.origin[i]);
+    }
+    for (const auto& change : changes.of_model) {
+      change(model);
+    }
+    return model;
+  }
+
+  /// Amounts between those that are settled come from the next larger one, without its highest particles.
+  static double settled_amount(double fill) noexcept { return std::ceil(fill / fill_step - 1e-9) * fill_step; }
+
+  /// How many particles of a settled start belong to an amount.
+  template <class Fluid>
+  static Index amount_of(const Fluid& settled, double fill) noexcept {
+    const double share = fill / settled_amount(fill);
+    return static_cast<Index>(std::llround(share * static_cast<double>(settled.size())));
+  }
+
+  /// The particles that remain if the highest ones are taken off.
+  static std::vector<Index> lowest(const Model& model, Index count) {
+    const auto& fluid = const_cast<Model&>(model).fluid();
+    const Vector3<double> down = model.settings().gravity;
+    std::vector<std::pair<double, std::uint32_t>> depth(static_cast<std::size_t>(fluid.size()));
+    std::vector<Index> order(depth.size());
+    for (std::size_t k = 0; k < depth.size(); ++k) {
+      const auto i = static_cast<Index>(k);
+      order[k] = i;
+      depth[k] = {-down.dot(fluid.position.col(i).template cast<double>()), fluid.id[i]};
+    }
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+      return depth[static_cast<std::size_t>(a)] < depth[static_cast<std::size_t>(b)];
+    });
+    order.resize(static_cast<std::size_t>(count));
+    return order;
+  }
+
+  /// Made by whichever thread needs it first, while others that need it wait.
+  const Model& settled(double spacing, double fill) const {
+    Start* start = nullptr;
+    {
+      const std::lock_guard lock(starts_->mutex);
+      auto& slot = starts_->by_spacing_and_fill[{spacing, settled_amount(fill)}];
+      if (!slot) {
+        slot = std::make_unique<Start>();
+      }
+      start = slot.get();
+    }
+    std::call_once(start->once,
+                   [&] { start->model = std::make_unique<const Model>(scene_.start(spacing, settled_amount(fill))); });
+    return *start->model;
+  }
+
+  struct Start {
+    std::once_flag once{};
+    std::unique_ptr<const Model> model{};
+  };
+  struct Starts {
+    std::mutex mutex{};
+    std::map<std::pair<double, double>, std::unique_ptr<Start>> by_spacing_and_fill{};
+  };
+
+  static constexpr double fill_step = 0.05;
+
+  Scene scene_;
+  SimulatedInteractionSettings settings_;
+  std::vector<Effect> effects_{};
+  std::vector<decltype(InteractionEffect<Model>::apply)> apply_{};
+  std::shared_ptr<Starts> starts_;  ///< copies share what they have settled
+};
+
+}  // namespace decant::inline DECANT_TARGET

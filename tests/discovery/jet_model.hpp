@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A forward model without liquid: balls that a nozzle throws through the picture, one after another, each on its own.
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/image.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+
+namespace decant_test {
+
+/// What decides how balls fly.
+struct Jet {
+  double drag = 0, pull = 0, speed = 1, late = 0;  ///< [1/s], [m/s^2], over what is assumed, [s]
+  double gust = 0;                                 ///< [m/s^2], for a while only
+  int fatter = 0;                                  ///< of what is drawn [px]
+};
+
+/// @param seed of where each ball leaves the nozzle, and how fast. @param angle of the nozzle [rad].
+inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32_t seed, double angle = 0.9) {
+  std::mt19937 random(seed);
+  const auto noise = [&] { return static_cast<double>(random()) / 2147483648.0 - 1; };
+  struct Ball {
+    double born, x, y, u, v;
+  };
+  // no two films are alike: the nozzle itself is not quite the same
+  const double pressure = 1 + 0.006 * noise(), aim = angle + 0.008 * noise();
+  std::vector<Ball> balls;
+  for (int k = 0; k < 120; ++k) {
+    const double speed = 2.2 * jet.speed * pressure * (1 + 0.05 * noise());
+    const double own = aim + 0.05 * noise();
+    balls.push_back({0.008 * k + jet.late, 0.1 + 0.004 * noise(), 0.3 + 0.004 * noise(), speed * std::cos(own),
+                     speed * std::sin(own)});
+  }
+  decant::SilhouetteSeries film(160, 120, 10);
+  const double step = 1.0 / 300;
+  double now = 0;
+  for (int frame = 0; frame < 16; ++frame) {
+    const double time = frame / 15.0;
+    for (; now < time - 1e-9; now += step) {
+      const double gust = now > 0.4 && now < 0.6 ? jet.gust : 0;
+      for (Ball& ball : balls) {
+        if (now >= ball.born) {
+          ball.u += step * (jet.pull + gust - jet.drag * ball.u);
+          ball.v += step * (-9.81 - jet.drag * ball.v);
+          ball.x += step * ball.u;
+          ball.y += step * ball.v;
+        }
+      }
+    }
+    decant::Mask mask = decant::Mask::Zero(120, 160);
+    const int radius = 5 + jet.fatter;
+    for (const Ball& ball : balls) {
+      const int u = static_cast<int>(std::lround(160 * ball.x)), v = 119 - static_cast<int>(std::lround(160 * ball.y));
+      for (int dv = -radius; now >= ball.born && dv <= radius; ++dv) {
+        for (int du = -radius; du <= radius; ++du) {
+          if (du * du + dv * dv <= radius * radius && u + du >= 0 && u + du < 160 && v + dv >= 0 && v + dv < 120) {
+            mask(v + dv, u + du) = decant::mask_liquid;
+          }
+        }
+      }
+    }
+    film.add(time, mask);
+  }
+  return {film};
+}
+
+/// Knows of drag, a pull, the speed (which is tolerated within 1 %), poses that are late, and fat masks.
+class JetModel {
+ public:
+  explicit JetModel(double angle = 0.9) : angle_(angle) {
+    const auto add = [&](const char* name, const decant::EffectComponent& component, decant::EffectKind kind) {
+      decant::Effect effect;
+      effect.name = name;
+      effect.unit = "unit of " + effect.name;
+      effect.components = {component};
+      effect.kind = kind;
+      effects_.push_back(effect);
+    };
+    add("drag", {"", 0, 0, 1.5}, decant::EffectKind::Physics);
+    add("pull", {"", 0, -1.5, 1.5, 0.05}, decant::EffectKind::Physics);
+    add("speed", {"", 1, 0.85, 1.15, 0.01}, decant::EffectKind::Physics);
+    add("late", {"", 0, -0.1, 0.1, 0.004}, decant::EffectKind::Measurement);
+    add("fat", {"", 0, 0, 2, 1}, decant::EffectKind::Nuisance);
+  }
+
+  const std::vector<decant::Effect>& effects() const noexcept { return effects_; }
+
+  std::vector<decant::SilhouetteSeries> predict(const decant::ModelRun& run) const {
+    std::vector<double> strength;
+    std::mt19937 random(run.seed + 77);
+    for (const decant::Effect& effect : effects_) {
+      strength.push_back(effect.components[0].base);
+      const double share = static_cast<double>(random()) / 2147483648.0 - 1;
+      if (run.tolerated && effect.kind != decant::EffectKind::Nuisance) {
+        strength.back() += share * effect.components[0].tolerance;
+      }
+    }
+    for (const decant::AppliedEffect& applied : run.effects) {
+      strength.at(applied.effect) = applied.strength[0];
+    }
+    if (strength[0] > broken_above) {
+      return {};
+    }
+    return film_of({strength[0], strength[1], strength[2], strength[3], 0, static_cast<int>(strength[4])}, run.seed,
+                   angle_);
+  }
+
+  double broken_above = 1e9;  ///< of drag: runs fail
+
+ private:
+  double angle_;
+  std::vector<decant::Effect> effects_{};
+};
+static_assert(decant::ForwardModel<JetModel>);
+
+}  // namespace decant_test

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <decant/discovery/missing_effect.hpp>
+#include <decant/hypothesis/thread_executor.hpp>
+
+#include "catch.hpp"
+#include "jet_model.hpp"
+
+using namespace decant;
+using decant_test::film_of;
+using decant_test::Jet;
+using decant_test::JetModel;
+
+namespace {
+
+/// What is found in a film of one jet, and checked on one of a nozzle that points elsewhere.
+MissingEffect found_in(const Jet& jet, std::uint32_t seed, const MissingEffectSettings& settings = {}) {
+  const JetModel model(0.9), other(0.6);
+  ThreadExecutor executor{{1}};
+  MissingEffectSearch<JetModel> search({{"a", &model, film_of(jet, seed, 0.9)}},
+                                       {{"b", &other, film_of(jet, seed + 1, 0.6)}}, run_jobs_on(executor), settings);
+  return search.find();
+}
+
+std::string name_of(const MissingEffect& result) {
+  const JetModel model;
+  return result.found.empty() ? "" : model.effects()[result.found.front().effect].name;
+}
+
+}  // namespace
+
+TEST_CASE("missing effect: each is named with its strength, and confirmed where it was not looked at") {
+  struct Case {
+    Jet jet;
+    std::string name;
+    double strength;
+  };
+  const std::vector<Case> cases{
+      {{0.5, 0}, "drag", 0.5}, {{0, 0.9}, "pull", 0.9}, {{0, 0, 1.06}, "speed", 1.06}, {{0, 0, 1, 0.05}, "late", 0.05}};
+  for (const Case& each : cases) {
+    const MissingEffect result = found_in(each.jet, 31);
+    INFO(each.name << " " << each.strength);
+    CHECK(result.verdict == Verdict::Named);
+    REQUIRE(name_of(result) == each.name);
+    const RefinedEffect& effect = result.found.front();
+    CHECK(effect.strength[0] == Approx(each.strength).epsilon(0.2));
+    // four standard deviations are beyond any luck
+    const double base = each.name == "speed" ? 1 : 0;
+    CHECK(std::abs(effect.strength[0] - each.strength) < 4 * effect.deviation[0]);
+    CHECK(effect.deviation[0] < 0.3 * std::abs(each.strength - base));
+    CHECK(effect.share > 0.8);
+    CHECK(result.learn.after < result.learn.before);
+    CHECK(result.confirmation == Confirmation::Confirmed);
+    CHECK(result.held_out.share() > 0.75);
+  }
+}
+
+TEST_CASE("missing effect: what a pour does not tell apart is told as a set") {
+  // a weak pull against the jet looks like drag, up to what chance decides
+  int sets = 0;
+  for (const std::uint32_t seed : {31U, 34U, 37U, 40U}) {
+    const MissingEffect result = found_in({0, -0.7}, seed);
+    REQUIRE((result.verdict == Verdict::OneOf || result.verdict == Verdict::Named));
+    if (result.verdict == Verdict::OneOf) {
+      ++sets;
+      CHECK(std::count(result.one_of.begin(), result.one_of.end(), 0U) == 1);
+      CHECK(std::count(result.one_of.begin(), result.one_of.end(), 1U) == 1);
+    }
+  }
+  CHECK(sets >= 1);
+}
+
+TEST_CASE("missing effect: nothing where nothing is, also where all is off within its tolerance") {
+  for (const Jet& jet : {Jet{}, Jet{0, 0.03, 0.995, -0.003}, Jet{0, 0, 1, 0, 0, 1}}) {
+    for (const std::uint32_t seed : {51U, 52U, 53U}) {
+      const MissingEffect result = found_in(jet, seed);
+      CHECK(result.verdict == Verdict::Nothing);
+      CHECK(result.found.empty());
+      CHECK(result.confirmation == Confirmation::Untested);
+    }
+  }
+}
+
+TEST_CASE("missing effect: what is not in the catalogue is unexplained, and where it begins is told") {
+  const MissingEffect result = found_in({0, 0, 1, 0, 12}, 61);
+  CHECK(result.verdict == Verdict::Unexplained);
+  CHECK(result.found.empty());
+  REQUIRE(!result.where.front().empty());
+  double first = 10;
+  for (const Disagreement& each : result.where.front()) {
+    first = std::min(first, each.begin);
+  }
+  // from 0.4 s on, in windows of 0.133 s
+  CHECK(first > 0.26);
+  CHECK(first < 0.6);
+}
+
+TEST_CASE("missing effect: two at once are found one after another") {
+  const MissingEffect result = found_in({0, 0.8, 1, 0.05}, 71);
+  CHECK(result.verdict == Verdict::Named);
+  REQUIRE(result.found.size() == 2);
+  std::map<std::size_t, RefinedEffect> found;
+  for (const RefinedEffect& each : result.found) {
+    found[each.effect] = each;
+  }
+  REQUIRE(found.contains(1));
+  REQUIRE(found.contains(3));
+  // each at its own strength: alone, either would have to do for both
+  CHECK(std::abs(found[1].strength[0] - 0.8) < 4 * found[1].deviation[0]);
+  CHECK(std::abs(found[3].strength[0] - 0.05) < 4 * found[3].deviation[0]);
+  CHECK(found[1].deviation[0] < 0.2);
+  CHECK(found[3].deviation[0] < 0.01);
+  CHECK(result.confirmation == Confirmation::Confirmed);
+}
+
+TEST_CASE("missing effect: runs that fail are left out, and no run is made twice") {
+  JetModel model(0.9);
+  model.broken_above = 0.75;  // half the range: the stronger of both runs fails
+  ThreadExecutor executor{{1}};
+  std::map<std::string, int> asked;
+  const RunJobs run_jobs = run_jobs_on(executor);
+  const RunJobs counted = [&](const std::vector<std::string>& keys, const std::function<JobResult(std::size_t)>& work) {
+    for (const std::string& key : keys) {
+      ++asked[key];
+    }
+    return run_jobs(keys, work);
+  };
+  const MissingEffect result =
+      MissingEffectSearch<JetModel>({{"a", &model, film_of({0.4, 0}, 81)}}, {}, counted).find();
+  CHECK(name_of(result) == "drag");
+  CHECK(result.found.front().strength[0] == Approx(0.4).epsilon(0.2));
+  std::size_t total = 0;
+  for (const auto& [key, times] : asked) {
+    CHECK(times == 1);
+    total += static_cast<std::size_t>(times);
+  }
+  CHECK(total == result.runs);
+  CHECK(result.confirmation == Confirmation::Untested);
+}
+
+TEST_CASE("missing effect: what is asked is checked") {
+  const JetModel model;
+  ThreadExecutor executor{{1}};
+  const RunJobs run_jobs = run_jobs_on(executor);
+  using Search = MissingEffectSearch<JetModel>;
+  const auto film = film_of({}, 1);
+  CHECK_THROWS_WITH(Search({}, {}, run_jobs), decant_test::contains("at least one"));
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {{"a", &model, film}}, run_jobs),
+                    decant_test::contains("all different"));
+  CHECK_THROWS_WITH(Search({{"a", nullptr, film}}, {}, run_jobs), decant_test::contains("model of 'a'"));
+  MissingEffectSettings settings;
+  settings.refined = 0;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("refined"));
+  settings = {};
+  settings.dictionary.draws = 3;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings).find(), decant_test::contains("draws"));
+}
