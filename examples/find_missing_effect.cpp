@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: MIT
+// What a simulation lacks, by recordings of what really happened:
+//   find_missing_effect --learn DIR... --held-out DIR... --json OUT.json --report OUT.html
+// Exit status 0: done; 2: a recording, a file or an argument is wrong.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <decant/core/stopwatch.hpp>
+#include <decant/io/journal.hpp>
+#include <decant/io/progress.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/io/report.hpp>
+#include <decant/version.hpp>
+
+#include "support/missing_effect_output.hpp"
+#include "support/recorded_interaction.hpp"
+#include "support/result_file.hpp"
+#include "support/sweep_executor.hpp"
+#include "support/tool.hpp"
+
+namespace {
+
+using Interactions = std::vector<decant::Interaction<example::RecordedModel>>;
+
+void write_report(const std::string& file, const std::vector<decant::Effect>& effects,
+                  const std::vector<std::string>& recordings, const decant::MissingEffect& result) {
+  decant::HtmlReport report("What the model lacks");
+  report.paragraph(example::missing_effect_sentence(effects, result));
+  for (const decant::RefinedEffect& each : result.found) {
+    report.paragraph(effects[each.effect].words() + ": " + effects[each.effect].meaning +
+                     ". In the model: " + example::detail::effect_code(effects, each));
+  }
+  report.heading("The gap");
+  report.table(example::gap_table(result));
+  report.heading("Where");
+  report.table(example::where_table(recordings, result));
+  report.heading("Candidates");
+  report.table(example::candidates_table(effects, result));
+  report.write(file);
+}
+
+}  // namespace
+
+int main(int count, char** values) {
+  const example::SweepSession session;
+  std::string json_file, report_file, journal_file;
+  std::vector<std::string> learn_folders, held_out_folders;
+  example::InteractionOptions options;
+  decant::MissingEffectSettings settings;
+  double spacing_mm = 1e3 * options.model.spacing;
+  int threads = 0;
+  CLI::App app("Finds which effect a simulation lacks, how strong it is, and whether other recordings agree.");
+  app.add_option("--learn", learn_folders, "folders of recordings that have it, format version 1")->required();
+  app.add_option("--held-out", held_out_folders, "folders of other recordings that have it, to check on");
+  app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
+  app.add_option("--json", json_file, "writes what was found");
+  app.add_option("--report", report_file, "writes a page with tables, for a browser");
+  app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--draws", settings.dictionary.draws,
+                 "runs with all that is tolerated drawn, to know what chance does")
+      ->check(CLI::Range(5, 1000));
+  app.add_option("--threads", threads, "runs side by side, each on one thread; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  return example::run_tool(app, count, values, [&] {
+    example::SweepExecutor executor = example::sweep_executor(threads);
+    example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
+    options.model.spacing = 1e-3 * spacing_mm;
+    std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
+    const auto read = [&](const std::vector<std::string>& folders) {
+      Interactions interactions;
+      for (const std::string& folder : folders) {
+        kept.push_back(std::make_unique<example::RecordedInteraction>(
+            example::recorded_interaction(decant::read_recording(folder), options)));
+        interactions.push_back({folder, &kept.back()->model, kept.back()->seen});
+      }
+      return interactions;
+    };
+    Interactions learn = read(learn_folders), held_out = read(held_out_folders);
+    const std::vector<decant::Effect>& effects = kept.front()->model.effects();
+    const auto planned =
+        static_cast<double>(decant::plan_dictionary(effects, settings.dictionary).size() * learn_folders.size());
+    decant::Progress progress("finding", planned);
+    double runs = 0, milliseconds = 0;
+    const auto told = [&](std::size_t, const decant::JobResult&) {
+      ++runs;
+      progress.update(std::min(runs, planned), std::to_string(static_cast<long>(runs)) + " runs");
+    };
+    std::optional<decant::Journal> journal;
+    if (!journal_file.empty()) {
+      journal.emplace(executor, journal_file,
+                      std::string("find_missing_effect of decant ") + DECANT_VERSION + " at " +
+                          decant::detail::number_text(spacing_mm) + " mm");
+    }
+    const decant::RunJobs run_jobs = [&](const std::vector<std::string>& keys,
+                                         const std::function<decant::JobResult(std::size_t)>& work) {
+      return journal ? decant::run_journaled(executor, *journal, keys, work, told)
+                     : executor.run(keys.size(), work, told);
+    };
+    decant::MissingEffect result;
+    {
+      const decant::Stopwatch watch(milliseconds);
+      result =
+          decant::MissingEffectSearch<example::RecordedModel>(std::move(learn), std::move(held_out), run_jobs, settings)
+              .find();
+    }
+    progress.finish();
+    std::printf("%s\n%s%s%s", example::missing_effect_sentence(effects, result).c_str(),
+                example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
+                example::candidates_table(effects, result).text().c_str());
+    example::in_first_process(executor, [&] {
+      if (!json_file.empty()) {
+        nlohmann::json json = example::missing_effect_json(effects, result);
+        json["seconds"] = 1e-3 * milliseconds;
+        json["spacing_mm"] = spacing_mm;
+        example::write_result(json_file, json);
+      }
+      if (!report_file.empty()) {
+        write_report(report_file, effects, learn_folders, result);
+      }
+    });
+    return 0;
+  });
+}

@@ -1,0 +1,245 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What the workflow for missing effects found, for scripts and for people.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/discovery/missing_effect.hpp>
+#include <decant/io/detail/text.hpp>
+#include <decant/io/report.hpp>
+#include <decant/io/table.hpp>
+
+#include "json_result.hpp"
+#include "liquid_fit.hpp"
+
+namespace example {
+
+inline std::string to_string(decant::Verdict verdict) {
+  using decant::Verdict;
+  return verdict == Verdict::Nothing ? "nothing"
+         : verdict == Verdict::Named ? "named"
+         : verdict == Verdict::OneOf ? "one_of"
+                                     : "unexplained";
+}
+
+namespace detail {
+
+using Effects = std::vector<decant::Effect>;
+
+/// One number as it is, several as a list.
+inline nlohmann::json components_json(const Eigen::VectorXd& values) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const double value : values) {
+    json.push_back(number_json(value));
+  }
+  return json.size() == 1 ? json.front() : json;
+}
+
+inline std::string components_text(const Eigen::VectorXd& values) {
+  std::string text;
+  for (const double value : values) {
+    text += (text.empty() ? "" : ", ") + three_digits(value);
+  }
+  return text;
+}
+
+inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedEffect& found) {
+  const decant::Effect& effect = effects.at(found.effect);
+  nlohmann::json json = {{"effect", effect.name},
+                         {"where", effect.where},
+                         {"strength", components_json(found.strength)},
+                         {"unit", effect.unit},
+                         {"share", number_json(found.share)},
+                         {"distance", number_json(found.distance)}};
+  for (std::size_t k = 0; k < effect.components.size(); ++k) {
+    const auto [low, high] = found.interval_90(k);
+    json["interval_90"].push_back({number_json(low), number_json(high)});
+  }
+  if (effect.components.size() == 1) {
+    json["interval_90"] = json["interval_90"].front();
+  }
+  if (found.place) {
+    json["place"] = {found.place->x(), found.place->y(), found.place->z()};
+  }
+  if (effect.name == "lateral_force" && found.strength.norm() > 0) {
+    json["direction_w"] = {found.strength[0] / found.strength.norm(), found.strength[1] / found.strength.norm(), 0.0};
+  }
+  return json;
+}
+
+/// In words, such as "viscosity 9e-4 m^2/s".
+inline std::string effect_words(const Effects& effects, const decant::RefinedEffect& found) {
+  const decant::Effect& effect = effects.at(found.effect);
+  return effect.words() + " " + components_text(found.strength) + (effect.unit.empty() ? "" : " " + effect.unit);
+}
+
+/// The effect's line of C++ with its strengths.
+inline std::string effect_code(const Effects& effects, const decant::RefinedEffect& found) {
+  std::string code;
+  Eigen::Index k = 0;
+  for (const char c : effects.at(found.effect).code) {
+    code += c == '@' && k < found.strength.size() ? three_digits(found.strength[k++]) : std::string(1, c);
+  }
+  return code;
+}
+
+}  // namespace detail
+
+/// The answer in one sentence.
+inline std::string missing_effect_sentence(const std::vector<decant::Effect>& effects,
+                                           const decant::MissingEffect& result) {
+  using decant::Verdict;
+  if (result.verdict == Verdict::Nothing) {
+    return "No gap between simulation and recordings beyond what is tolerated.";
+  }
+  if (result.verdict == Verdict::Unexplained) {
+    return "There is a gap that no effect of the catalogue explains" +
+           (result.refined.empty()
+                ? std::string(".")
+                : "; nearest is " + detail::effect_words(effects, result.refined.front()) + " (" +
+                      decant::detail::fixed_text(100 * result.refined.front().share, 0) + " % of what is reducible).");
+  }
+  std::string text = result.verdict == Verdict::OneOf ? "Missing is one of" : "Missing:";
+  if (result.verdict == Verdict::OneOf) {
+    for (std::size_t k = 0; k < result.one_of.size(); ++k) {
+      text += (k > 0 ? ", " : " ") + effects.at(result.one_of[k]).words();
+    }
+    return text + ", which these recordings do not tell apart.";
+  }
+  for (std::size_t k = 0; k < result.found.size(); ++k) {
+    text += (k > 0 ? ", and " : " ") + detail::effect_words(effects, result.found[k]);
+  }
+  return text + ": with it the gap falls by " + decant::detail::fixed_text(100 * result.learn.share(), 0) +
+         " % of what is reducible.";
+}
+
+inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& effects,
+                                          const decant::MissingEffect& result) {
+  using decant::Confirmation;
+  using decant::Verdict;
+  nlohmann::json json;
+  json["verdict"] = to_string(result.verdict);
+  json["effect"] = nlohmann::json::array();
+  if (result.verdict == Verdict::OneOf) {
+    for (const std::size_t which : result.one_of) {
+      json["effect"].push_back(effects.at(which).name);
+    }
+  } else {
+    for (const decant::RefinedEffect& each : result.found) {
+      json["effect"].push_back(effects.at(each.effect).name);
+    }
+  }
+  for (const decant::RefinedEffect& each : result.found) {
+    json["found"].push_back(detail::effect_json(effects, each));
+  }
+  if (!result.found.empty()) {
+    const nlohmann::json first = json["found"].front();
+    for (const char* key : {"strength", "unit", "interval_90", "place", "direction_w"}) {
+      json[key] = first.value(key, nlohmann::json());
+    }
+  }
+  for (const decant::RefinedEffect& each : result.refined) {
+    json["refined"].push_back(detail::effect_json(effects, each));
+  }
+  for (const decant::EffectStanding& each : result.judgement.standings) {
+    json["candidates"].push_back({{"effect", effects.at(each.effect).name},
+                                  {"where", effects.at(each.effect).where},
+                                  {"strength", detail::components_json(each.strength)},
+                                  {"distance", number_json(each.distance)},
+                                  {"share", number_json(each.share)},
+                                  {"vote", number_json(each.vote)}});
+  }
+  const decant::Disagreement* earliest = nullptr;
+  for (const auto& recording : result.where) {
+    for (const decant::Disagreement& each : recording) {
+      if (earliest == nullptr || each.begin < earliest->begin) {
+        earliest = &each;
+      }
+    }
+  }
+  json["onset_s"] = earliest != nullptr ? nlohmann::json(earliest->begin) : nlohmann::json();
+  json["onset_px"] = earliest != nullptr ? nlohmann::json({earliest->onset_u, earliest->onset_v}) : nlohmann::json();
+  json["gap"] = {{"before", number_json(result.learn.before)},
+                 {"after", number_json(result.learn.after)},
+                 {"noise", number_json(result.learn.noise)},
+                 {"largest_by_chance", number_json(result.judgement.chance.largest_distance)},
+                 {"improvement_by_chance", number_json(result.judgement.chance.improvement)},
+                 {"held_out_before", number_json(result.held_out.before)},
+                 {"held_out_after", number_json(result.held_out.after)},
+                 {"held_out_noise", number_json(result.held_out.noise)},
+                 {"best_rival_held_out", number_json(result.held_out.best_rival)}};
+  json["confirmed"] = result.confirmation == Confirmation::Confirmed     ? nlohmann::json(true)
+                      : result.confirmation == Confirmation::Refuted     ? nlohmann::json(false)
+                      : result.confirmation == Confirmation::NotTestable ? nlohmann::json("not_testable")
+                                                                         : nlohmann::json();
+  json["runs"] = result.runs;
+  return json;
+}
+
+/// Every candidate, the best first.
+inline decant::Table candidates_table(const std::vector<decant::Effect>& effects, const decant::MissingEffect& result) {
+  using decant::detail::fixed_text;
+  decant::Table table({"effect", "unit", "strength", "gap left", "of what is reducible [%]", "vote", "refined",
+                       "gap left then", "of what is reducible then [%]"});
+  for (const decant::EffectStanding& each : result.judgement.standings) {
+    const decant::Effect& effect = effects.at(each.effect);
+    std::vector<std::string> row{effect.words(),
+                                 effect.unit,
+                                 detail::components_text(each.strength),
+                                 fixed_text(each.distance, 2),
+                                 result.judgement.has_gap() ? fixed_text(100 * each.share, 0) : "",
+                                 fixed_text(each.vote, 2)};
+    const auto refined = std::find_if(result.refined.begin(), result.refined.end(),
+                                      [&](const auto& other) { return other.effect == each.effect; });
+    const bool is = refined != result.refined.end();
+    row.push_back(is ? detail::components_text(refined->strength) : "");
+    row.push_back(is ? fixed_text(refined->distance, 2) : "");
+    row.push_back(is ? fixed_text(100 * refined->share, 0) : "");
+    table.add(row);
+  }
+  return table;
+}
+
+inline decant::Table gap_table(const decant::MissingEffect& result) {
+  using decant::detail::fixed_text;
+  decant::Table table({"recordings", "gap before", "after", "where nothing is missing", "best rival's"});
+  const auto add = [&](const char* name, const decant::GapChange& gap) {
+    if (std::isfinite(gap.before)) {
+      table.add({name, fixed_text(gap.before, 2), fixed_text(gap.after, 2), fixed_text(gap.noise, 2),
+                 std::isfinite(gap.best_rival) ? fixed_text(gap.best_rival, 2) : ""});
+    }
+  };
+  add("learnt from", result.learn);
+  add("held out", result.held_out);
+  return table;
+}
+
+/// Disagreements, the heaviest first.
+inline decant::Table where_table(const std::vector<std::string>& recordings, const decant::MissingEffect& result) {
+  using decant::detail::fixed_text;
+  decant::Table table({"recording", "camera", "liquid", "from [s]", "to [s]", "begins at u, v [px]", "u [px]", "v [px]",
+                       "largest, in what chance does"});
+  for (std::size_t which = 0; which < result.where.size(); ++which) {
+    for (std::size_t k = 0; k < std::min<std::size_t>(8, result.where[which].size()); ++k) {
+      const decant::Disagreement& each = result.where[which][k];
+      table.add({recordings.at(which), std::to_string(each.camera), each.unexpected ? "unexpected" : "missing",
+                 fixed_text(each.begin, 2), fixed_text(each.end, 2),
+                 fixed_text(each.onset_u, 0) + ", " + fixed_text(each.onset_v, 0),
+                 std::to_string(each.box.u_begin) + " .. " + std::to_string(each.box.u_end),
+                 std::to_string(each.box.v_begin) + " .. " + std::to_string(each.box.v_end),
+                 fixed_text(each.largest, 1)});
+    }
+  }
+  return table;
+}
+
+}  // namespace example

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+
+#include <cmath>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/effect_judgement.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+namespace {
+
+Effect named(const std::string& name, const std::string& family = "") {
+  Effect effect;
+  effect.name = name;
+  effect.family = family;
+  effect.components = {{"", 0, -1, 1}};
+  return effect;
+}
+
+/// An effect whose distance falls from `without` by `improvement` at a strength of 1/2, as a parabola.
+StrengthProfile falling(double without, double improvement) {
+  return {{{{0, 1, false}, {-1, 1}}},
+          without,
+          Eigen::Vector2d(2 * improvement, 0),
+          Eigen::Vector2d(4 * improvement, 0).asDiagonal()};
+}
+
+EffectEvidence evidence(double distance, const std::vector<double>& improvement,
+                        const std::vector<double>& overlap = {}) {
+  EffectEvidence result;
+  result.distance = distance;
+  for (const double each : improvement) {
+    result.profile.emplace_back(falling(distance, each));
+  }
+  result.overlap = {0.4, overlap.empty() ? std::vector<double>(improvement.size(), 0) : overlap};
+  result.blurred = {0.4, std::vector<double>(improvement.size(), 0)};
+  return result;
+}
+
+ChanceLevel usual_chance() {
+  ChanceLevel chance;
+  chance.distance = 1.2;
+  chance.largest_distance = 2;
+  chance.improvement = 0.3;
+  chance.overlap = chance.blurred = 0.1;
+  return chance;
+}
+
+}  // namespace
+
+TEST_CASE("effect dictionary: runs to both sides of each component, templates for what is not named") {
+  std::vector<Effect> effects{named("one"), named("two"), named("seen"), named("sure")};
+  effects[0].components = {{"", 2, 2, 4}};  // to one side alone
+  effects[1].components = {{"x", 0, -1, 1, 0.1}, {"y", 0, -1, 1}};
+  effects[2].kind = EffectKind::Nuisance;
+  effects[2].components[0].tolerance = 0.2;
+  effects[3].kind = EffectKind::Nuisance;
+  DictionarySettings settings;
+  settings.baselines = 2;
+  settings.draws = 7;
+  settings.shares = {0.5, 1};
+  const std::vector<PlannedRun> runs = plan_dictionary(effects, settings);
+  std::vector<int> count(4);
+  std::set<std::string> keys;
+  std::set<std::pair<double, double>> of_two;
+  for (const PlannedRun& each : runs) {
+    ++count[static_cast<std::size_t>(each.role)];
+    keys.insert(run_key(effects, each.run));
+    CHECK(each.run.tolerated == (each.role == RunRole::Draw));
+    if (each.role == RunRole::Effect && each.effect == 1) {
+      of_two.insert({each.run.effects.front().strength[0], each.run.effects.front().strength[1]});
+    }
+    if (each.role == RunRole::Template) {
+      CHECK(each.effect == 2);
+      CHECK(each.run.effects.front().strength[0] == 0.2);
+      CHECK(each.run.seed == runs.front().run.seed);  // differs from the first baseline in nothing else
+    }
+  }
+  CHECK(count == std::vector<int>{2, 7, 1, 2 + 8});
+  CHECK(keys.size() == runs.size());
+  CHECK(of_two == std::set<std::pair<double, double>>{
+                      {-1, 0}, {-0.5, 0}, {0.5, 0}, {1, 0}, {0, -1}, {0, -0.5}, {0, 0.5}, {0, 1}});
+
+  // around a model that has been given something already, which runs about that replace
+  const std::vector<AppliedEffect> added{{0, Eigen::VectorXd::Constant(1, 3), {}}};
+  for (const PlannedRun& each : plan_dictionary(effects, settings, added)) {
+    const bool about_it = each.role == RunRole::Effect && each.effect == 0;
+    std::size_t times = 0;
+    for (const AppliedEffect& applied : each.run.effects) {
+      times += applied.effect == 0 ? 1 : 0;
+    }
+    CHECK(times == 1);
+    if (!about_it) {
+      CHECK(each.run.effects.front().strength[0] == 3);
+    }
+  }
+  settings.shares = {1.5};
+  CHECK_THROWS_WITH(plan_dictionary(effects, settings), decant_test::contains("share"));
+  effects[0].name.clear();
+  CHECK_THROWS_WITH(plan_dictionary(effects), decant_test::contains("name"));
+}
+
+TEST_CASE("effect judgement: a name, a set, nothing or unexplained") {
+  const std::vector<Effect> effects{named("drag_linear", "drag"), named("drag_quadratic", "drag"), named("pull")};
+  const auto judge = [&](const EffectEvidence& of) { return judge_effects(effects, {of}, usual_chance()); };
+
+  const Judgement pull = judge(evidence(6, {1, 1.2, 4.5}));
+  CHECK(pull.verdict == Verdict::Named);
+  REQUIRE(pull.standings.front().effect == 2);
+  CHECK(pull.standings.front().strength[0] == Approx(0.5).epsilon(1e-4));
+  CHECK(pull.standings.front().share == Approx(4.5 / 4.8));
+  CHECK(pull.standings.front().vote == Approx(1));
+  // the distance grows by what chance does, 0.3, within a quarter of the root of 0.3 / 4.5
+  CHECK(pull.standings.front().interval[0].first == Approx(0.5 - 0.5 * std::sqrt(0.3 / 4.5)).epsilon(1e-3));
+
+  // of one family: one answer
+  const Judgement drag = judge(evidence(6, {4.4, 4.5, 1}));
+  CHECK(drag.verdict == Verdict::Named);
+  CHECK(drag.named.size() == 1);
+  const Judgement either = judge(evidence(6, {4.2, 1, 4.5}));
+  CHECK(either.verdict == Verdict::OneOf);
+  CHECK(either.named.size() == 2);
+
+  CHECK(judge(evidence(1.9, {0.1, 0.2, 0.29})).verdict == Verdict::Nothing);
+  CHECK(judge(evidence(1.9, {0.1, 0.2, 0.6})).verdict == Verdict::Named);  // small, and beyond chance all the same
+  CHECK(judge(evidence(6, {0.1, 0.2, 1})).verdict == Verdict::Unexplained);
+  CHECK(judge(evidence(6, {0.1, 0.2, 0.25})).verdict == Verdict::Unexplained);
+  CHECK(judge_effects({}, {evidence(6, {})}, usual_chance()).verdict == Verdict::Unexplained);
+  CHECK(judge_effects({}, {evidence(1, {})}, usual_chance()).verdict == Verdict::Nothing);
+
+  // A gap that shrinks by more than chance has a say, one that does not has none: 0.4 is what there is of it.
+  const Judgement heard = judge(evidence(6, {4.2, 1, 4.5}, {0.2, 0, 0.02}));
+  CHECK(heard.standings.front().effect == 0);
+  const Judgement not_heard = judge(evidence(6, {4.2, 1, 4.5}, {0.03, 0, 0}));
+  CHECK(not_heard.standings.front().effect == 2);
+}
+
+TEST_CASE("effect judgement: several recordings have one strength") {
+  const std::vector<Effect> effects{named("pull"), named("drag")};
+  // alone each is explained by either; at one strength for both only the pull does
+  EffectEvidence first = evidence(5, {3, 3}), second = evidence(5, {3, 0});
+  second.profile[1] = StrengthProfile({{{0, 1, false}, {-1, 1}}}, 5, Eigen::Vector2d(-6, 0),
+                                      Eigen::Vector2d(12, 0).asDiagonal());  // best at -1/2
+  CHECK(judge_effects(effects, {first}, usual_chance()).verdict == Verdict::OneOf);
+  CHECK(judge_effects(effects, {second}, usual_chance()).verdict == Verdict::OneOf);
+  const Judgement both = judge_effects(effects, {first, second}, usual_chance());
+  CHECK(both.verdict == Verdict::Named);
+  CHECK(both.standings.front().effect == 0);
+  CHECK(both.standings.front().improvement == Approx(3));
+  CHECK(both.distance == Approx(5));
+  second.profile.pop_back();
+  CHECK_THROWS_WITH(judge_effects(effects, {first, second}, usual_chance()), decant_test::contains("first one"));
+}
+
+TEST_CASE("effect judgement: chance is what the worst of the draws does, and a little more") {
+  std::vector<EffectEvidence> draws;
+  for (int k = 0; k < 6; ++k) {
+    draws.push_back(evidence(1 + 0.1 * k, {0.01 * k, 0.05}, {0.004 * k, 0}));
+  }
+  JudgementSettings settings;
+  settings.distance_factor = 1.1;
+  settings.improvement_factor = settings.gap_factor = 2;
+  const ChanceLevel level = chance_level({draws}, settings);
+  CHECK(level.distance == Approx(1.25));
+  CHECK(level.largest_distance == Approx(1.65));
+  CHECK(level.improvement == Approx(0.1));
+  CHECK(level.overlap == Approx(2 * 0.02 / 0.4));
+  CHECK(level.blurred == 0);
+  draws.resize(4);
+  CHECK_THROWS_WITH(chance_level({draws}), decant_test::contains("at least 5"));
+}

@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include <decant/boundary/shapes.hpp>
+#include <decant/camera/pinhole_camera.hpp>
+#include <decant/discovery/liquid_effects.hpp>
+#include <decant/discovery/simulated_interaction.hpp>
+#include <decant/simulation/fill.hpp>
+#include <decant/simulation/simulator.hpp>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+namespace {
+
+/// A user's own effect: turns liquid about the z axis.
+struct Stirrer {
+  using Scalar = float;
+  float rate = 0;  // [1/s^2]
+
+  template <class Step>
+  void accumulate(const Step& step, PointArray<float>& acceleration) noexcept {
+    for (Index i = 0; i < step.fluid.size(); ++i) {
+      const Vector3<float> x = step.fluid.position.col(i);
+      acceleration.col(i) += rate * Vector3<float>(-x.y(), x.x(), 0);
+    }
+  }
+  template <class Step>
+  float largest_step(const Step&) const noexcept {
+    return 1;
+  }
+};
+
+using PourModel = Simulator<WithForces<EffectParts<>, Stirrer>>;
+using Pour = SimulatedInteraction<PourModel, PinholeCamera>;
+constexpr double pour_seconds = 0.6;
+
+/// A small cup that turns over a pan in half a second, both moved along by `aside`, its motion late by `late`.
+Pour::Scene pour_scene(const Vector3<double>& aside = Vector3<double>::Zero(), double late = 0) {
+  Pour::Scene scene;
+  std::vector<PoseTrack::Sample> samples;
+  for (int k = 0; k <= 40; ++k) {
+    const double time = 0.025 * k, turn = 1.9 * std::clamp((time - late) / 0.4, 0.0, 1.0);
+    samples.push_back({time,
+                       {Eigen::Quaterniond(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY())),
+                        Vector3<double>(-0.05, 0, 0.12) + aside}});
+  }
+  scene.motion = {PoseTrack(samples), PoseTrack(Pose{Eigen::Quaterniond::Identity(), aside})};
+  scene.start = [first = scene.motion](double spacing, double fill) {
+    SimulatorSettings settings;
+    settings.spacing = spacing;
+    settings.threads = {1};
+    settings.liquid.surface_tension = 0;
+    PourModel model(for_tracking(settings));
+    const BodyId cup = model.add_body("cup", Cup{0.025, 0.03, 0.07, 0.003}, PoseTrack(first[0].at(0)));
+    model.add_body("pan", CylinderInside{0.08, 0.03, 0.003, Face::PositiveZ}, PoseTrack(first[1].at(0)));
+    decant::fill(model, cup, FillAmount::fraction(0.6 * fill));
+    return model;
+  };
+  const Eigen::Matrix3d axes = (Eigen::Matrix3d() << 1, 0, 0, 0, 0, -1, 0, 1, 0).finished();  // looks along +y
+  InteractionCamera<PinholeCamera> camera{PinholeCamera(300, 300, 159.5, 119.5, 320, 240), {}, 300, 0.5};
+  for (double time = 0; time < pour_seconds + 1e-9; time += 0.1) {
+    scene.times.push_back(time);
+    camera.camera_from_world.push_back({Eigen::Quaterniond(axes), {0, 0.08, 0.5}});
+  }
+  scene.cameras = {camera};
+  return scene;
+}
+
+std::vector<InteractionEffect<PourModel>> pour_catalogue() {
+  auto effects = force_effects<PourModel>(1e-6);
+  effects.push_back(suction_effect<PourModel>({0.1, 0, 0.05}, "beside"));
+  effects.push_back(fill_effect<PourModel>());
+  for (auto& effect : measurement_effects<PourModel>({"cup", "pan"})) {
+    effects.push_back(std::move(effect));
+  }
+  return effects;
+}
+
+Pour pour_of(Pour::Scene scene = pour_scene(), double jitter = 0.05) {
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  settings.jitter = jitter;
+  return Pour(std::move(scene), pour_catalogue(), settings);
+}
+
+ModelRun run_with(const Pour& pour, const std::string& name, const std::vector<double>& strength,
+                  const std::string& where = "") {
+  for (std::size_t k = 0; k < pour.effects().size(); ++k) {
+    if (pour.effects()[k].name == name && (where.empty() || pour.effects()[k].where == where)) {
+      return {{{k, Eigen::Map<const Eigen::VectorXd>(strength.data(), static_cast<Index>(strength.size())), {}}}, 1};
+    }
+  }
+  throw std::runtime_error("no effect " + name);
+}
+
+/// All shares together, where they are, and how far they differ.
+double wet_area(const SilhouetteSeries& seen) {
+  double sum = 0;
+  for (std::size_t frame = 0; frame < seen.frames(); ++frame) {
+    for (Index row = 0; row < seen.rows(); ++row) {
+      for (Index column = 0; column < seen.columns(); ++column) {
+        sum += static_cast<double>(seen.share(frame, row, column));
+      }
+    }
+  }
+  return sum;
+}
+double mean_row(const SilhouetteSeries& seen) {
+  double sum = 0;
+  for (std::size_t frame = 0; frame < seen.frames(); ++frame) {
+    for (Index row = 0; row < seen.rows(); ++row) {
+      for (Index column = 0; column < seen.columns(); ++column) {
+        sum += static_cast<double>(row) * static_cast<double>(seen.share(frame, row, column));
+      }
+    }
+  }
+  return sum / wet_area(seen);
+}
+double apart(const SilhouetteSeries& a, const SilhouetteSeries& b, Index columns_on = 0) {
+  double sum = 0;
+  for (std::size_t frame = 0; frame < a.frames(); ++frame) {
+    for (Index row = 0; row < a.rows(); ++row) {
+      for (Index column = 0; column + columns_on < a.columns(); ++column) {
+        sum += std::abs(static_cast<double>(a.share(frame, row, column)) -
+                        static_cast<double>(b.share(frame, row, column + columns_on)));
+      }
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST_CASE("simulated interaction: a run is what its seed and its effects make of it") {
+  const Pour pour = pour_of();
+  const auto once = pour.predict({{}, 1, false}), again = pour.predict({{}, 1, false});
+  REQUIRE(once.size() == 1);
+  CHECK(once[0].frames() == 7);
+  CHECK(once[0].numbers() == again[0].numbers());
+  CHECK(wet_area(once[0]) > 20);
+  CHECK(apart(once[0], pour.predict({{}, 2, false})[0]) > 1);
+  // without any shaking seeds make no difference
+  const Pour calm = pour_of(pour_scene(), 0);
+  CHECK(calm.predict({{}, 1, false})[0].numbers() == calm.predict({{}, 2, false})[0].numbers());
+  // liquid has arrived in the pan
+  PourModel model = pour.started({{}, 1, false});
+  const float most = 0.04F;
+  CHECK((model.fluid().position.row(2).array() > most).all());
+  REQUIRE(model.step(pour_seconds).advanced());
+  CHECK((model.fluid().position.row(2).array() < most).count() > model.fluid().size() / 2);
+}
+
+TEST_CASE("simulated interaction: poses that are late or off are the motion that they tell of") {
+  // recorded late by a tenth of a second: what is recorded for 0.1 s later is so now
+  const Pour late = pour_of(pour_scene(Vector3<double>::Zero(), 0.1), 0), in_time = pour_of(pour_scene(), 0);
+  const auto seen = late.predict(run_with(late, "latency", {0.1}));
+  CHECK(apart(seen[0], in_time.predict({{}, 1, false})[0]) < 1e-6 + 0.02 * wet_area(seen[0]));
+  CHECK(apart(seen[0], late.predict({{}, 1, false})[0]) > 0.2 * wet_area(seen[0]));
+
+  // the cup alone, then the pan alone, with the liquid of the cup going along
+  const Vector3<double> off(0.02, 0, 0);
+  const PourModel moved = in_time.started(run_with(in_time, "body_pose", {0.02, 0, 0}, "cup"));
+  const PourModel still = in_time.started({{}, 1, false});
+  CHECK((moved.bodies()[0].motion.at(0.3 + moved.time()).translation -
+         still.bodies()[0].motion.at(0.3 + still.time()).translation - off)
+            .norm() < 1e-12);
+  CHECK((moved.bodies()[1].motion.at(0.3).translation - still.bodies()[1].motion.at(0.3).translation).norm() == 0);
+  CHECK(moved.fluid().size() == still.fluid().size());
+  CHECK((moved.fluid().position.rowwise().mean() - still.fluid().position.rowwise().mean() - off.cast<float>()).norm() <
+        1e-5F);
+}
+
+TEST_CASE("simulated interaction: errors of a camera change its picture alone") {
+  const Pour pour = pour_of(pour_scene(), 0);
+  const auto plain = pour.predict({{}, 1, false});
+  // ten pixels are one cell
+  const auto shifted = pour.predict(run_with(pour, "camera_shift", {10, 0}));
+  CHECK(apart(plain[0], shifted[0], 1) < 0.1 * apart(plain[0], shifted[0]));
+  const auto lower = pour.predict(run_with(pour, "camera_shift", {0, 10}));
+  CHECK(mean_row(lower[0]) - mean_row(plain[0]) == Approx(1).epsilon(0.1));  // v points down
+  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {2}))[0]) > 1.1 * wet_area(plain[0]));
+  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {-2}))[0]) < 0.95 * wet_area(plain[0]));
+  // a turn of the picture about its middle by a quarter takes what is above it to the right
+  const auto turned = pour.predict(run_with(pour, "camera_roll", {1.5707963}));
+  CHECK(apart(plain[0], turned[0]) > wet_area(plain[0]));
+}
+
+TEST_CASE("simulated interaction: effects reach the model, and amounts are what is asked for") {
+  const Pour pour = pour_of();
+  const auto number = [&](const char* name, const std::vector<double>& strength, auto read) {
+    PourModel model = pour.started(run_with(pour, name, strength));
+    return static_cast<double>(read(model));
+  };
+  CHECK(number("drag_linear", {1.5}, [](auto& m) { return m.template force<LinearDrag<float>>().rate; }) == 1.5);
+  CHECK(number("drag_quadratic", {1.5}, [](auto& m) { return m.template force<QuadraticDrag<float>>().drag; }) == 1.5);
+  CHECK(number("viscosity", {1e-3}, [](auto& m) { return m.template force<Viscosity<float>>().kinematic_viscosity; }) ==
+        Approx(1e-3));
+  CHECK(number("surface_tension", {0.2},
+               [](auto& m) { return m.template force<SurfaceTension<float>>().surface_tension; }) == Approx(0.2));
+  CHECK(number("wall_friction", {20}, [](auto& m) { return m.template force<WallFriction<float>>().rate; }) == 20);
+  CHECK(number("wall_adhesion", {20}, [](auto& m) { return m.template force<WallAdhesion<float>>().strength; }) == 20);
+  CHECK(number("gravity", {9}, [](auto& m) { return m.template force<Gravity<float>>().acceleration.z(); }) ==
+        Approx(-9));
+  CHECK(number("lateral_force", {0.5, -0.25},
+               [](auto& m) { return m.template force<BodyAcceleration<float>>().pull.y(); }) == -0.25);
+  CHECK(number("suction", {6}, [](auto& m) { return m.template force<Suction<float>>().strength; }) == 6);
+  CHECK(number("suction", {6}, [](auto& m) { return m.template force<Suction<float>>().point.x(); }) == Approx(0.1));
+  ModelRun elsewhere = run_with(pour, "suction", {6});
+  elsewhere.effects[0].place = Vector3<double>(0, 0.2, 0);
+  CHECK(pour.started(elsewhere).force<Suction<float>>().point.y() == Approx(0.2));
+
+  const auto amount = [&](double fill) { return number("fill", {fill}, [](auto& m) { return m.fluid().size(); }); };
+  const double assumed = static_cast<double>(pour.started({{}, 1, false}).fluid().size());
+  for (const double fill : {0.8, 0.93, 1.02, 1.2}) {
+    CHECK(amount(fill) == Approx(fill * assumed).margin(1));
+  }
+}
+
+TEST_CASE("simulated interaction: what is tolerated is drawn within its tolerance, by the seed") {
+  const Pour pour = pour_of();
+  double most_delay = 0, most_pull = 0;
+  int coarser = 0, finer = 0;
+  for (std::uint32_t seed = 0; seed < 40; ++seed) {
+    const auto [changes, spacing] = pour.changes({{}, seed, true});
+    CHECK(pour.changes({{}, seed, true}).first.pose_delay == changes.pose_delay);
+    CHECK(std::abs(changes.pose_delay) <= 0.008);
+    CHECK(std::abs(changes.fill - 1) <= 0.02);
+    CHECK(changes.body_offset[1].cwiseAbs().maxCoeff() <= 2e-3);
+    // taken account of by templates
+    CHECK(changes.camera_shift.norm() == 0);
+    CHECK(changes.mask_growth == 0);
+    coarser += spacing > 1 ? 1 : 0;
+    finer += spacing < 1 ? 1 : 0;
+    most_delay = std::max(most_delay, std::abs(changes.pose_delay));
+    PourModel model = pour.started({{}, seed, true});
+    const auto& pull = model.force<BodyAcceleration<float>>().pull;
+    CHECK(pull.cwiseAbs().maxCoeff() <= 0.03F);
+    most_pull = std::max(most_pull, static_cast<double>(std::abs(pull.x())));
+  }
+  CHECK(most_delay > 0.006);
+  CHECK(most_pull > 0.02);
+  CHECK(coarser > 5);
+  CHECK(finer > 5);
+  const auto [changes, spacing] = pour.changes({{}, 3, false});
+  CHECK(spacing == 1);
+  CHECK(changes.of_model.empty());
+}
+
+TEST_CASE("simulated interaction: an effect of a user's own is a force, a name and a range") {
+  auto effects = pour_catalogue();
+  Effect stirrer;
+  stirrer.name = "stirrer";
+  stirrer.unit = "1/s^2";
+  stirrer.components = {{"", 0, -50, 50}};
+  effects.push_back(
+      force_effect<Stirrer, PourModel>(stirrer, [](Stirrer& force, double s) { force.rate = static_cast<float>(s); }));
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  CHECK(pour.started(run_with(pour, "stirrer", {40})).force<Stirrer>().rate == 40);
+  CHECK(apart(pour.predict(run_with(pour, "stirrer", {40}))[0], pour.predict({{}, 1, false})[0]) > 5);
+}
+
+TEST_CASE("simulated interaction: scenes, effects and runs are checked") {
+  CHECK_THROWS_WITH(Pour({}, {}), decant_test::contains("start"));
+  Pour::Scene scene = pour_scene();
+  scene.times[2] = scene.times[1];
+  CHECK_THROWS_WITH(Pour(scene, {}), decant_test::contains("increasing"));
+  scene = pour_scene();
+  scene.cameras[0].camera_from_world.pop_back();
+  CHECK_THROWS_WITH(Pour(scene, {}), decant_test::contains("poses of a camera"));
+  auto effects = pour_catalogue();
+  effects[0].components[0].low = 1;
+  CHECK_THROWS_WITH(Pour(pour_scene(), effects), decant_test::contains("drag_linear"));
+  effects = pour_catalogue();
+  effects[0].apply = nullptr;
+  CHECK_THROWS_WITH(Pour(pour_scene(), effects), decant_test::contains("apply"));
+  const Pour pour = pour_of();
+  CHECK_THROWS_WITH(pour.predict({{{99, Eigen::VectorXd::Zero(1), {}}}}), decant_test::contains("effect"));
+  CHECK_THROWS_WITH(pour.predict({{{0, Eigen::VectorXd::Zero(2), {}}}}), decant_test::contains("each component"));
+}
