@@ -14,6 +14,7 @@
 #include <decant/force/gravity.hpp>
 #include <decant/force/linear_drag.hpp>
 #include <decant/force/residual_viscosity.hpp>
+#include <decant/force/shear_thinning_viscosity.hpp>
 #include <decant/force/surface_tension.hpp>
 #include <decant/force/surface_tension_schenck2017.hpp>
 #include <decant/force/viscosity.hpp>
@@ -145,6 +146,12 @@ void measure(Report& report, int per_edge, int threads) {
   add("Gravity", decant::Gravity<Scalar>{});
   add("LinearDrag", decant::LinearDrag<Scalar>{.rate = 1});
   add("Viscosity", decant::Viscosity<Scalar>{});
+  add("ShearThinningViscosity that does not thin", decant::ShearThinningViscosity<Scalar>{});
+  decant::ShearThinningViscosity<Scalar> of_ketchup;
+  of_ketchup.kinematic_viscosity = Scalar(1e-2);
+  of_ketchup.relaxation_time = 1;
+  of_ketchup.exponent = Scalar(0.4);
+  add("ShearThinningViscosity", of_ketchup);
   add("ResidualViscosity", decant::ResidualViscosity<Scalar>{});
   add("SurfaceTension", decant::SurfaceTension<Scalar>{});
   decant::ViscosityWeiler2018<Scalar> of_honey;

@@ -134,7 +134,7 @@ inline bool blocks(const BlockageResult& result, std::size_t hypothesis, std::si
 /// are sharp, and 36 % where they widen nearly to the leg's bore: as much as 8 points of opening either way. So
 /// hypotheses are half-way between the two, 31 %, and an opening is known no better than the form is.
 inline constexpr double blockage_flare = 0.3;
-inline double form_deviation(double opening) noexcept { return opening * (1 - opening) / 3; }
+inline double form_deviation(double opening) noexcept { return std::max(0.03, opening * (1 - opening) / 3); }
 
 /// A leg's opening after a frame, whatever the other legs' are. Nothing where every hypothesis has failed.
 inline std::optional<decant::ValueDensity> opening_density(const BlockageResult& result, std::size_t leg,

@@ -152,6 +152,36 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   effects.push_back(suction_effect<EffectModel>(places.jet - aside * across, "beside the jet, the other side"));
   effects.push_back(suction_effect<EffectModel>(places.jet + aside * along, "beside the jet, behind"));
   effects.push_back(suction_effect<EffectModel>(places.jet - aside * along, "beside the jet, in front"));
+  for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
+    const recording::Body& body = recording.bodies[k];
+    const bool source = body.role == recording::Role::Source;
+    if (!source && body.role != recording::Role::Target) {
+      continue;
+    }
+    // the lowest place inside, and its outside
+    const BoundingVolumeHierarchy surface(body.mesh);
+    const Vector3<double> own_up = body.motion.at(recording.timestamps.front()).rotation.conjugate() * up;
+    const Cavity cavity(std::make_shared<const BoundingVolumeHierarchy>(body.mesh), own_up);
+    if (cavity.empty()) {
+      continue;
+    }
+    const Vector3<double> middle = surface.bounds().center();
+    const Vector3<double> floor = middle + (cavity.bottom_height() - middle.dot(own_up)) * own_up;
+    double lowest = 0;
+    for (const auto& vertex : body.mesh.vertices) {
+      lowest = std::min(lowest, own_up.dot(vertex - floor));
+    }
+    const auto id = static_cast<BodyId>(k);
+    effects.push_back(
+        leak_effect<EffectModel>(id, floor + 0.003 * own_up, (lowest - 0.009) * own_up, "floor of the " + body.name));
+    if (!source) {
+      effects.push_back(
+          loss_effect<EffectModel>(id, middle, 0.5 * surface.bounds().diagonal().norm(), "in the " + body.name));
+      effects.push_back(inflow_effect<EffectModel>(body.motion.at(recording.timestamps.front()) * middle + 0.08 * up,
+                                                   static_cast<Origin>(recording.bodies.size()),
+                                                   "above the " + body.name));
+    }
+  }
   if (recording.liquid.initial) {
     const double full = recording.liquid.initial->fill_fraction ? 1 / *recording.liquid.initial->fill_fraction : 1.25;
     effects.push_back(fill_effect<EffectModel>(std::clamp(full, 1.05, 1.25)));

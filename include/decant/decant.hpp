@@ -90,6 +90,7 @@
 #include <decant/force/pair_kernel.hpp>
 #include <decant/force/quadratic_drag.hpp>
 #include <decant/force/residual_viscosity.hpp>
+#include <decant/force/shear_thinning_viscosity.hpp>
 #include <decant/force/step_view.hpp>
 #include <decant/force/suction.hpp>
 #include <decant/force/surface_tension.hpp>
@@ -147,6 +148,7 @@
 #include <decant/simulation/gauges.hpp>
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/liquid.hpp>
+#include <decant/simulation/outlet.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
 #include <decant/simulation/simulator_settings.hpp>

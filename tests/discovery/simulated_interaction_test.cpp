@@ -81,6 +81,9 @@ Pour::Scene pour_scene(const Vector3<double>& aside = Vector3<double>::Zero(), d
 std::vector<InteractionEffect<PourModel>> pour_catalogue() {
   auto effects = force_effects<PourModel>(1e-6);
   effects.push_back(suction_effect<PourModel>({0.1, 0, 0.05}, "beside"));
+  effects.push_back(leak_effect<PourModel>(0, {0, 0, 0.004}, {0, 0, -0.02}, "cup"));
+  effects.push_back(loss_effect<PourModel>(1, {0, 0, 0.015}, 0.1, "pan"));
+  effects.push_back(inflow_effect<PourModel>({0.03, 0, 0.1}, 2, "above"));
   effects.push_back(fill_effect<PourModel>());
   for (auto& effect : measurement_effects<PourModel>({"cup", "pan"})) {
     effects.push_back(std::move(effect));
@@ -205,8 +208,9 @@ TEST_CASE("simulated interaction: effects reach the model, and amounts are what 
   };
   CHECK(number("drag_linear", {1.5}, [](auto& m) { return m.template force<LinearDrag<float>>().rate; }) == 1.5);
   CHECK(number("drag_quadratic", {1.5}, [](auto& m) { return m.template force<QuadraticDrag<float>>().drag; }) == 1.5);
-  CHECK(number("viscosity", {1e-3}, [](auto& m) { return m.template force<Viscosity<float>>().kinematic_viscosity; }) ==
-        Approx(1e-3));
+  CHECK(number("viscosity", {1e-3}, [](auto& m) {
+          return m.template force<ShearThinningViscosity<float>>().kinematic_viscosity;
+        }) == Approx(1e-3));
   CHECK(number("surface_tension", {0.2},
                [](auto& m) { return m.template force<SurfaceTension<float>>().surface_tension; }) == Approx(0.2));
   CHECK(number("wall_friction", {20}, [](auto& m) { return m.template force<WallFriction<float>>().rate; }) == 20);
@@ -226,6 +230,31 @@ TEST_CASE("simulated interaction: effects reach the model, and amounts are what 
   for (const double fill : {0.8, 0.93, 1.02, 1.2}) {
     CHECK(amount(fill) == Approx(fill * assumed).margin(1));
   }
+}
+
+TEST_CASE("simulated interaction: leaks, losses and inflow take and bring what they are asked for") {
+  const Pour pour = pour_of();
+  const double particle = 0.009 * 0.009 * 0.009;
+  const auto after = [&](const char* name, double flow) {
+    PourModel model = pour.started(run_with(pour, name, {flow}));
+    StepReport report;
+    for (int frame = 0; frame < 12; ++frame) {
+      report = model.step(0.05);
+      REQUIRE(report.advanced());
+    }
+    return report;
+  };
+  const auto start = static_cast<double>(pour.started({{}, 1, false}).fluid().size());
+  // 30 ml/s for 0.6 s, where the cup holds liquid for so long; what has leaked is still there
+  const StepReport leak = after("leak", 30);
+  CHECK(leak.drained > 4e-6);
+  CHECK(leak.drained < 18e-6 + particle);
+  CHECK(static_cast<double>(leak.particles) == start);
+  const StepReport loss = after("loss", 30);
+  CHECK(loss.drained > 1e-6);  // from when liquid has arrived
+  CHECK(static_cast<double>(loss.particles) == Approx(start - loss.drained / particle).margin(0.5));
+  const StepReport inflow = after("inflow", 30);
+  CHECK(static_cast<double>(inflow.particles) - start == Approx(18e-6 / particle).margin(6));
 }
 
 TEST_CASE("simulated interaction: what is tolerated is drawn within its tolerance, by the seed") {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -144,6 +145,14 @@ TEST_CASE("value estimate: an error beside what is known widens a density") {
   const decant::ValueDensity partly = decant::smeared(known, [](double value) { return value < 0.4 ? 0.1 : 0.0; });
   CHECK(partly.quantile(0.02) < known.quantile(0.02) - 0.05);
   CHECK(decant::smeared(known, [](double) { return 0.0; }).quantile(0.9) == Approx(known.quantile(0.9)).epsilon(0.01));
+  // what is most probable at an end is so afterwards, and even densities stay even
+  const std::vector<double> three{0, 0.5, 1}, rising{-4, -2, 0}, even{0, 0, 0};
+  const decant::ValueDensity open(three, rising);
+  CHECK(decant::smeared(open, [](double value) { return std::max(0.05, 0.2 * (1 - value)); }).interval(0.9).second ==
+        1);
+  const decant::ValueDensity flat = decant::smeared(decant::ValueDensity(three, even), [](double) { return 0.1; });
+  CHECK(flat.quantile(0.05) == Approx(0.05).epsilon(0.02));
+  CHECK(flat.density(0) == Approx(1).epsilon(0.02));
   // what is certain stays so
   const std::vector<double> one{3}, certain{0};
   CHECK(decant::smeared(decant::ValueDensity(one, certain), [](double) { return 1.0; }).quantile(0.3) == 3);

@@ -362,6 +362,7 @@ class RigidBodies {
       flux += share.dot(velocity);
       WallContact<Scalar>& contact = contacts[k];
       contact.body = near[k].body;
+      contact.distance = static_cast<Scalar>(near[k].distance);
       contact.gradient = share.template cast<Scalar>();
       contact.velocity = velocity.template cast<Scalar>();
       // The pull of a plane at distance a is 2 slope / a. Below a quarter spacing the particle is in the wall's own

@@ -19,6 +19,7 @@ template <class Scalar>
 struct WallContact {
   std::uint32_t body = 0;
   Scalar friction = 0;  ///< viscous rate per kinematic viscosity [1/m^2]; 0 for free slip
+  Scalar distance = 0;  ///< to the body's surface [m], >= 0
   Vector3<Scalar> gradient = Vector3<Scalar>::Zero();  ///< [1/m]
   Vector3<Scalar> velocity = Vector3<Scalar>::Zero();  ///< of the body, as if it reached to the particle [m/s]
 };

@@ -23,11 +23,13 @@
 #include <decant/force/linear_drag.hpp>
 #include <decant/force/quadratic_drag.hpp>
 #include <decant/force/residual_viscosity.hpp>
+#include <decant/force/shear_thinning_viscosity.hpp>
 #include <decant/force/suction.hpp>
 #include <decant/force/surface_tension.hpp>
-#include <decant/force/viscosity.hpp>
 #include <decant/force/wall_adhesion.hpp>
 #include <decant/force/wall_friction.hpp>
+#include <decant/simulation/inlet.hpp>
+#include <decant/simulation/outlet.hpp>
 #include <decant/simulation/parts.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -36,9 +38,9 @@ namespace decant::inline DECANT_TARGET {
 template <class ScalarType = float>
 struct EffectParts : DefaultParts<ScalarType> {
   using Forces =
-      std::tuple<Gravity<ScalarType>, Viscosity<ScalarType>, ResidualViscosity<ScalarType>, SurfaceTension<ScalarType>,
-                 LinearDrag<ScalarType>, QuadraticDrag<ScalarType>, BodyAcceleration<ScalarType>, Suction<ScalarType>,
-                 WallFriction<ScalarType>, WallAdhesion<ScalarType>>;
+      std::tuple<Gravity<ScalarType>, ShearThinningViscosity<ScalarType>, ResidualViscosity<ScalarType>,
+                 SurfaceTension<ScalarType>, LinearDrag<ScalarType>, QuadraticDrag<ScalarType>,
+                 BodyAcceleration<ScalarType>, Suction<ScalarType>, WallFriction<ScalarType>, WallAdhesion<ScalarType>>;
 };
 
 namespace detail {
@@ -116,12 +118,24 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) 
                    {"", 0, 0, 3}, "simulator.force<QuadraticDrag<float>>().drag = @;"),
       [](auto& force, double s) { force.drag = static_cast<Scalar>(s); }));
   const double thick = 2e-3;  // [m^2/s]
-  effects.push_back(force_effect<Viscosity<Scalar>, Model>(
+  effects.push_back(force_effect<ShearThinningViscosity<Scalar>, Model>(
       plain_effect("viscosity", "viscosity", "m^2/s", "the liquid is thicker than assumed",
                    {"", kinematic_viscosity, kinematic_viscosity, std::max(thick, 10 * kinematic_viscosity),
                     std::max(2e-5, kinematic_viscosity), true},
-                   "simulator.force<Viscosity<float>>().kinematic_viscosity = @;"),
+                   "simulator.force<ShearThinningViscosity<float>>().kinematic_viscosity = @;"),
       [](auto& force, double s) { force.kinematic_viscosity = static_cast<Scalar>(s); }));
+  effects.push_back(force_effect<ShearThinningViscosity<Scalar>, Model>(
+      plain_effect(
+          "shear_thinning", "viscosity", "m^2/s",
+          "the liquid is thick at rest and the thinner the faster it is sheared (its strength is that at rest)",
+          {"", kinematic_viscosity, kinematic_viscosity, std::max(4 * thick, 10 * kinematic_viscosity), 0, true},
+          "simulator.force<ShearThinningViscosity<float>>() = {@, 1e-6, 0.1, 0.4};"),
+      [kinematic_viscosity](auto& force, double s) {
+        force.kinematic_viscosity = static_cast<Scalar>(s);
+        force.high_shear_viscosity = static_cast<Scalar>(kinematic_viscosity);
+        force.relaxation_time = Scalar(0.1);
+        force.exponent = Scalar(0.4);
+      }));
   effects.push_back(force_effect<SurfaceTension<Scalar>, Model>(
       plain_effect("surface_tension", "", "N/m", "the liquid's surface holds together more than assumed",
                    {"", 0, 0, 0.3, 0.02, true}, "simulator.force<SurfaceTension<float>>().surface_tension = @;"),
@@ -164,6 +178,88 @@ InteractionEffect<Model> suction_effect(const Vector3<double>& place, std::strin
       effect, [](Suction<Scalar>& force, const Eigen::VectorXd& s, const Vector3<double>& point) {
         force.strength = static_cast<Scalar>(s[0]);
         force.point = point.template cast<Scalar>();
+      });
+}
+
+namespace detail {
+
+/// From now on and for good.
+inline std::vector<std::pair<double, double>> steady(double millilitres_per_second) {
+  const double flow = 1e-6 * millilitres_per_second;  // [m^3/s]
+  return {{-1e6, flow}, {1e6, flow}};
+}
+
+}  // namespace detail
+
+/// A hole. @param place where liquid goes out, and @param below how far from there it goes on outside of the wall, both
+/// in the body's frame [m]. @param where in words.
+template <class Model>
+InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, const Vector3<double>& below,
+                                     std::string where) {
+  Effect effect =
+      detail::plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
+                           "simulator.add_outlet({container, place, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
+  effect.place = place;
+  effect.where = std::move(where);
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics,
+      [body, below](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
+        OutletSettings outlet;
+        outlet.body = body;
+        outlet.position = at;
+        outlet.exit = at + below;
+        outlet.flow = detail::steady(s[0]);
+        changes.of_model.push_back([outlet](Model& model) {
+          OutletSettings own = outlet;
+          own.radius = 3 * model.spacing();
+          model.add_outlet(own);
+        });
+      });
+}
+
+/// Liquid that a container loses everywhere: it evaporates, or the container soaks it up. @param radius around the
+/// place that the container is within [m].
+template <class Model>
+InteractionEffect<Model> loss_effect(BodyId body, const Vector3<double>& place, double radius, std::string where) {
+  Effect effect = detail::plain_effect("loss", "", "ml/s", "liquid disappears little by little", {"", 0, 0, 40},
+                                       "simulator.add_outlet({container, middle, radius, {{0, 1e-6 * @}, {60, 1e-6 * "
+                                       "@}}, OutletOrder::Evenly});");
+  effect.place = place;
+  effect.where = std::move(where);
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics,
+      [body, radius](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
+        OutletSettings outlet;
+        outlet.body = body;
+        outlet.position = at;
+        outlet.radius = radius;
+        outlet.order = OutletOrder::Evenly;
+        outlet.flow = detail::steady(s[0]);
+        changes.of_model.push_back([outlet](Model& model) { model.add_outlet(outlet); });
+      });
+}
+
+/// Liquid that comes from somewhere else, falling. @param place [m], world frame. @param origin of its particles.
+template <class Model>
+InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin origin, std::string where) {
+  Effect effect =
+      detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
+                           "simulator.add_inlet({place, down, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
+  effect.place = place;
+  effect.where = std::move(where);
+  effect.place_tolerance = 0.04;
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics,
+      [origin](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
+        InletSettings inlet;
+        inlet.position = at;
+        inlet.flow = detail::steady(s[0]);
+        changes.of_model.push_back([inlet, origin](Model& model) {
+          InletSettings own = inlet;
+          own.direction = model.settings().gravity;
+          own.radius = model.spacing();
+          model.add_inlet(own, origin);
+        });
       });
 }
 

@@ -3,16 +3,13 @@
 
 /// Internal friction of a thin liquid, and friction at walls that hold it.
 
-#include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <vector>
 
-#include <decant/boundary/wall_state.hpp>
-#include <decant/core/batch.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
+#include <decant/force/detail/viscous_friction.hpp>
 #include <decant/force/detail/viscous_pair.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -48,30 +45,14 @@ struct Viscosity {
       return;
     }
     using Kernel = typename Step::Kernel;
-    using B = Batch<Scalar>;
-    const Index count = step.fluid.size();
-    velocity_.resize(4 * static_cast<std::size_t>(count));
-    parallel_for(count, step.threads, [&](Index i) {
-      for (Index axis = 0; axis < 3; ++axis) {
-        velocity_[static_cast<std::size_t>(4 * i + axis)] = step.fluid.velocity(axis, i);
-      }
-    });
+    detail::note_velocities(step, velocity_);
     const detail::ViscousPair<Scalar> weight(static_cast<Scalar>(Kernel::support_factor) * step.smoothing_length);
     const Scalar factor = -kinematic_viscosity / step.rest_density;
-    parallel_for(count, step.threads, [&](Index i) {
-      const Scalar* own = &velocity_[static_cast<std::size_t>(4 * i)];
-      const B own_x(own[0]), own_y(own[1]), own_z(own[2]);
-      B x(Scalar(0)), y(Scalar(0)), z(Scalar(0));
-      step.neighbors.for_each_batch(i, [&](const auto& pair) {
-        const auto other = gather3(velocity_.data(), pair.neighbor);
-        const B approach = (own_x - other.x) * pair.x + (own_y - other.y) * pair.y + (own_z - other.z) * pair.z;
-        const B push = step.mass(pair.neighbor) * approach * weight(pair.distance_squared);
-        x = multiply_add(push, pair.x, x);
-        y = multiply_add(push, pair.y, y);
-        z = multiply_add(push, pair.z, z);
-      });
-      acceleration.col(i) += factor * Vector3<Scalar>(sum_each(std::array{x, y, z}).data());
-      add_wall_friction(step, i, acceleration);
+    parallel_for(step.fluid.size(), step.threads, [&](Index i) {
+      acceleration.col(i) += factor * detail::sum_of_pushes(step, i, velocity_, weight,
+                                                            [](const auto& push, const auto&) { return push; });
+      detail::add_wall_friction(step, i, acceleration,
+                                [this](const auto&, const auto&) { return kinematic_viscosity; });
     });
   }
 
@@ -87,25 +68,6 @@ struct Viscosity {
   }
 
  private:
-  template <class Step>
-  void add_wall_friction(const Step& step, Index i, PointArray<Scalar>& acceleration) const noexcept {
-    const WallContact<Scalar>* contacts = step.walls.contacts_of(i);
-    Vector3<Scalar> velocity = step.fluid.velocity.col(i);  // after the walls so far
-    for (int k = 0; k < step.walls.contact_count[i]; ++k) {
-      const WallContact<Scalar>& contact = contacts[k];
-      const Scalar steepness = contact.gradient.norm();
-      if (!(contact.friction > 0) || !(steepness > 0)) {
-        continue;
-      }
-      const Vector3<Scalar> normal = contact.gradient / steepness;
-      const Vector3<Scalar> slip = velocity - contact.velocity;
-      const Scalar rate = std::min(kinematic_viscosity * contact.friction, 1 / step.time_step);
-      const Vector3<Scalar> pull = -rate * (slip - slip.dot(normal) * normal);
-      velocity += step.time_step * pull;
-      acceleration.col(i) += pull;
-    }
-  }
-
   std::vector<Scalar> velocity_{};  ///< records of four, the last one unused
 };
 

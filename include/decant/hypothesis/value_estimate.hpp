@@ -198,8 +198,11 @@ ValueDensity smeared(const ValueDensity& density, Deviation&& deviation) {
     const double middle = 0.5 * (values[at] + values[at + 1]), until = density.share_below(values[at + 1]);
     const double width = std::max(static_cast<double>(deviation(middle)), (high - low) / steps);
     for (std::size_t other = 0; other < values.size(); ++other) {
-      const double off = (values[other] - middle) / width;
-      shares[other] += (until - below) / width * std::exp(-0.5 * off * off);
+      // what would lie beyond an end is folded back: what is most probable there stays so
+      for (const double from : {middle, 2 * low - middle, 2 * high - middle}) {
+        const double off = (values[other] - from) / width;
+        shares[other] += (until - below) / width * std::exp(-0.5 * off * off);
+      }
     }
     below = until;
   }

@@ -12,6 +12,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
+#include <decant/simulation/detail/flow_table.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -34,13 +35,7 @@ class Inlet {
             "a finite vector other than zero", settings_.direction.transpose());
     expects(settings_.radius > 0 && settings_.radius < 1e3 * spacing, "Inlet: radius [m]",
             "> 0 and below 1000 spacings", settings_.radius);
-    for (std::size_t k = 0; k < settings_.flow.size(); ++k) {
-      expects(
-          std::isfinite(settings_.flow[k].first) && (k == 0 || settings_.flow[k].first > settings_.flow[k - 1].first),
-          "Inlet: time [s] of the flow", "finite and increasing", settings_.flow[k].first);
-      expects(settings_.flow[k].second >= 0 && std::isfinite(settings_.flow[k].second), "Inlet: flow [m^3/s]",
-              ">= 0 and finite", settings_.flow[k].second);
-    }
+    detail::expects_flow("Inlet", settings_.flow);
     settings_.direction.normalize();
     const Vector3<double> across = settings_.direction.unitOrthogonal();
     const Vector3<double> along = settings_.direction.cross(across);
@@ -56,19 +51,7 @@ class Inlet {
   }
 
   /// Volume flow at a time [m^3/s].
-  double flow(double time) const noexcept {
-    const auto& table = settings_.flow;
-    if (table.empty() || time < table.front().first || time > table.back().first) {
-      return 0;
-    }
-    for (std::size_t k = 1; k < table.size(); ++k) {
-      if (time <= table[k].first) {
-        const double t = (time - table[k - 1].first) / (table[k].first - table[k - 1].first);
-        return table[k - 1].second + t * (table[k].second - table[k - 1].second);
-      }
-    }
-    return table.back().second;
-  }
+  double flow(double time) const noexcept { return detail::flow_at(settings_.flow, time); }
 
   /// Of the liquid that comes in [m/s].
   double speed(double time) const noexcept {

@@ -34,6 +34,7 @@
 #include <decant/pressure/position_based.hpp>
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/liquid.hpp>
+#include <decant/simulation/outlet.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/simulation/step_report.hpp>
@@ -180,19 +181,40 @@ class Simulator {
     inlets_.push_back({Inlet(inlet, settings_.spacing), origin});
   }
 
+  /// Adds an outlet: particles leave at the flow that it is asked for, as far as there is liquid within its radius
+  /// (StepReport::drained). Where it has an exit, a particle goes on there, the same one (id, origin), as soon as there
+  /// is a place near the exit a spacing off all other liquid; until then it stays, and so does all that would follow.
+  /// Throws std::invalid_argument if a setting is out of range, its body was not added, or the exit is in the body's
+  /// material.
+  void add_outlet(const OutletSettings& settings) {
+    Outlet outlet(settings, settings_.spacing);
+    if (settings.body) {
+      expects(*settings.body < bodies_.size(), "Outlet: body", "one that was added", *settings.body);
+      if (settings.exit) {
+        bodies_.set_interval(time_, 0);
+        probe_.resize(1);
+        probe_.position.col(0) = (bodies_[*settings.body].motion.at(time_) * *settings.exit).template cast<Scalar>();
+        expects(bodies_.push_out(*settings.body, 0, probe_) == 0, "Outlet: exit [m]", "outside of its body's material",
+                settings.exit->transpose());
+      }
+    }
+    outlets_.push_back(std::move(outlet));
+  }
+
   /// Removes all particles for which f(index) is true. @return how many.
   template <class Predicate>
   Index remove_particles_if(Predicate&& f) {
-    std::vector<std::uint32_t> kept;
+    staying_.clear();
+    staying_.reserve(static_cast<std::size_t>(fluid_.size()));
     for (Index i = 0; i < fluid_.size(); ++i) {
       if (!f(i)) {
-        kept.push_back(static_cast<std::uint32_t>(i));
+        staying_.push_back(static_cast<std::uint32_t>(i));
       }
     }
-    const Index removed = fluid_.size() - static_cast<Index>(kept.size());
+    const Index removed = fluid_.size() - static_cast<Index>(staying_.size());
     if (removed > 0) {
-      reorder(kept);
-      fluid_.resize(static_cast<Index>(kept.size()));
+      reorder(staying_);
+      fluid_.resize(static_cast<Index>(staying_.size()));
     }
     return removed;
   }
@@ -244,6 +266,8 @@ class Simulator {
     }
     lost_ += report.advanced() ? report.lost : 0;
     report.lost = lost_;
+    drained_ += report.advanced() ? report.drained : 0;
+    report.drained = drained_;
     summarize(report);
     count_contents(report);
     return report;
@@ -259,6 +283,8 @@ class Simulator {
     }
     std::vector<InletWithOrigin> inlets;
     inlets.swap(inlets_);
+    std::vector<Outlet> outlets;
+    outlets.swap(outlets_);
     StepReport report;
     const double slice = 0.02;
     for (double spent = 0; spent < most_time && fluid_.size() > 0; spent += slice) {
@@ -274,6 +300,7 @@ class Simulator {
     }
     fluid_.velocity.setZero();
     inlets_.swap(inlets);
+    outlets_.swap(outlets);
     bodies_ = std::move(moving);
     time_ = start;
     return report;
@@ -391,11 +418,17 @@ class Simulator {
     Index lost;
     std::vector<std::pair<Inlet, Origin>> inlets;
     std::vector<std::pair<BodyId, std::shared_ptr<const Cavity>>> watched;
+    std::vector<Outlet> outlets;
+    double drained;
   };
 
   Snapshot snapshot() const {
-    return {fluid_,  const_cast<Solver&>(solver_).memory(), bodies_, time_, longest_step_, next_id_, lost_, inlets_,
-            watched_};
+    return {fluid_,        const_cast<Solver&>(solver_).memory(),
+            bodies_,       time_,
+            longest_step_, next_id_,
+            lost_,         inlets_,
+            watched_,      outlets_,
+            drained_};
   }
 
   void restore(const Snapshot& snapshot) {
@@ -409,6 +442,8 @@ class Simulator {
     lost_ = snapshot.lost;
     inlets_ = snapshot.inlets;
     watched_ = snapshot.watched;
+    outlets_ = snapshot.outlets;
+    drained_ = snapshot.drained;
   }
 
  private:
@@ -460,14 +495,19 @@ class Simulator {
   }
 
   void append(const Vector3<Scalar>& position, const Vector3<Scalar>& velocity, Origin origin) {
+    append(position, velocity, origin, particle_mass(), next_id_++);
+  }
+
+  void append(const Vector3<Scalar>& position, const Vector3<Scalar>& velocity, Origin origin, Scalar mass,
+              std::uint32_t id) {
     const Index i = fluid_.size();
     fluid_.resize(i + 1);
     fluid_.position.col(i) = position;
     fluid_.velocity.col(i) = velocity;
-    fluid_.mass[i] = particle_mass();
+    fluid_.mass[i] = mass;
     fluid_.density[i] = static_cast<Scalar>(settings_.liquid.density);
     fluid_.pressure[i] = 0;
-    fluid_.id[i] = next_id_++;
+    fluid_.id[i] = id;
     fluid_.origin[i] = origin;
   }
 
@@ -504,6 +544,9 @@ class Simulator {
     for (const auto& [inlet, origin] : inlets_) {
       speed = std::max(speed, inlet.speed(time_));
     }
+    for (const Outlet& outlet : outlets_) {
+      speed = std::max(speed, outlet.exit_speed(time_));
+    }
     if (!std::isfinite(speed)) {
       return 0;
     }
@@ -539,6 +582,7 @@ class Simulator {
   /// @return whether the pressure solver converged.
   bool sub_step(double time_step, StepReport& report) noexcept {
     StepTimes& times = report.times;
+    let_out(time_step, report);
     bodies_.set_interval(time_, time_step);
     pour_in(time_step);
     find_neighbors(times);
@@ -594,6 +638,88 @@ class Simulator {
         append(x.cast<Scalar>(), v.cast<Scalar>(), from);
       });
     }
+  }
+
+  /// What goes on from an exit is taken out and put in again: solvers remember nothing of its old place. Leaves the
+  /// bodies' interval undefined.
+  void let_out(double time_step, StepReport& report) noexcept {
+    for (Outlet& outlet : outlets_) {
+      const OutletSettings& asked = outlet.settings();
+      const Pose world_from_frame = asked.body ? bodies_[*asked.body].motion.at(time_) : Pose{};
+      leaving_.clear();
+      emerging_.resize(0);
+      outlet.advance(time_, time_step, world_from_frame, fluid_, domain_, candidates_, [&](Index i) {
+        if (asked.exit) {
+          if (!find_exit_place(outlet, world_from_frame)) {
+            return 0.0;
+          }
+          const RigidVelocity frame =
+              asked.body ? bodies_[*asked.body].motion.velocity(time_, time_step) : RigidVelocity{};
+          const Vector3<Scalar> x = probe_.position.col(0);
+          const Vector3<double> v =
+              frame.at(x.template cast<double>()) + world_from_frame.rotation * asked.exit_velocity;
+          const Index last = emerging_.size();
+          emerging_.resize(last + 1);
+          emerging_.position.col(last) = x;
+          emerging_.velocity.col(last) = v.template cast<Scalar>();
+          emerging_.mass[last] = fluid_.mass[i];
+          emerging_.id[last] = fluid_.id[i];
+          emerging_.origin[last] = fluid_.origin[i];
+        }
+        leaving_.push_back(static_cast<std::uint32_t>(i));
+        const double volume = static_cast<double>(fluid_.mass[i]) / settings_.liquid.density;
+        report.drained += volume;
+        return volume;
+      });
+      if (leaving_.empty()) {
+        continue;
+      }
+      std::sort(leaving_.begin(), leaving_.end());
+      remove_particles_if(
+          [&](Index i) { return std::binary_search(leaving_.begin(), leaving_.end(), static_cast<std::uint32_t>(i)); });
+      for (Index k = 0; k < emerging_.size(); ++k) {
+        append(emerging_.position.col(k), emerging_.velocity.col(k), emerging_.origin[k], emerging_.mass[k],
+               emerging_.id[k]);
+      }
+    }
+  }
+
+  /// Looks for a place near an outlet's exit, on its side of all walls, half a spacing off them and a spacing off all
+  /// liquid, so that nothing is pushed apart. @return whether there is one; it is in probe_.
+  bool find_exit_place(const Outlet& outlet, const Pose& world_from_frame) noexcept {
+    const double clearance = 0.5 * settings_.spacing;
+    bodies_.set_interval(time_, 0);
+    exit_.set_count(1);
+    exit_.col(0) = (world_from_frame * *outlet.settings().exit).template cast<Scalar>();
+    probe_.resize(1);
+    probe_.position.col(0) = exit_.col(0);
+    for (BodyId body = 0; body < bodies_.size(); ++body) {
+      if (bodies_.push_out(body, clearance, probe_) > 0) {
+        return false;  // a body stands where the exit is
+      }
+    }
+    bodies_.sample(exit_, settings_.spacing, settings_.threads, exit_walls_);
+    for (const Vector3<double>& place : outlet.places()) {
+      probe_.position.col(0) = (world_from_frame * place).template cast<Scalar>();
+      const GuardReport guard = bodies_.guard(exit_, clearance, settings_.threads, exit_walls_, probe_);
+      if (guard.lost == 0 && is_clear(probe_.position.col(0), fluid_) && is_clear(probe_.position.col(0), emerging_)) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// No particle nearer than one spacing, but for rounding and for what is behind the walls at the exit.
+  bool is_clear(const Vector3<Scalar>& x, const FluidState<Scalar>& fluid) const noexcept {
+    const auto least = static_cast<Scalar>(0.99 * settings_.spacing);
+    for (Index i = 0; i < fluid.size(); ++i) {
+      const Vector3<Scalar> other = fluid.position.col(i);
+      if (domain_.separation(other, x).squaredNorm() < least * least &&
+          !bodies_.separated(x, other, exit_walls_.contacts_of(0), exit_walls_.contact_count[0])) {
+        return false;
+      }
+    }
+    return true;
   }
 
   void find_neighbors(StepTimes& times) noexcept {
@@ -663,6 +789,7 @@ class Simulator {
     kept_fluid_ = fluid_;
     kept_memory_ = solver_.memory();
     kept_inlets_ = inlets_;
+    kept_outlets_ = outlets_;
     kept_time_ = time_;
     kept_longest_step_ = longest_step_;
     kept_next_id_ = next_id_;
@@ -672,6 +799,7 @@ class Simulator {
     fluid_ = kept_fluid_;
     solver_.memory() = kept_memory_;
     inlets_ = kept_inlets_;
+    outlets_ = kept_outlets_;
     time_ = kept_time_;
     longest_step_ = kept_longest_step_;
     next_id_ = kept_next_id_;
@@ -733,6 +861,7 @@ class Simulator {
   Solver solver_{};
   Bodies bodies_{};
   std::vector<InletWithOrigin> inlets_{};
+  std::vector<Outlet> outlets_{};
   std::vector<Watched> watched_{};
 
   FluidState<Scalar> fluid_{};
@@ -745,6 +874,7 @@ class Simulator {
   double longest_step_ = 0;  ///< that the last sub-step could have been; 0 before the first
   std::uint32_t next_id_ = 0;
   Index lost_ = 0;
+  double drained_ = 0;  ///< [m^3]
 
   // scratch, and the state before the frame for frames that fail
   PointArray<Scalar> acceleration_{};
@@ -752,6 +882,11 @@ class Simulator {
   Growable<Scalar, 3> kept_velocity_{};
   PositionBased<Scalar> apart_{};
   std::vector<std::uint32_t> taken_{};  ///< particles that a corrector took from one place to another
+  std::vector<std::uint32_t> staying_{}, leaving_{};
+  std::vector<Outlet::Candidate> candidates_{};
+  FluidState<Scalar> emerging_{}, probe_{};
+  Growable<Scalar, 3> exit_{};
+  WallState<Scalar> exit_walls_{};
   RememberedWalls<Scalar> remembered_walls_{};
   Growable<Scalar, 3> shift_{};
   Growable<Scalar, 3> scratch_points_{};
@@ -762,6 +897,7 @@ class Simulator {
   FluidState<Scalar> kept_fluid_{};
   typename Solver::Memory kept_memory_{};
   std::vector<InletWithOrigin> kept_inlets_{};
+  std::vector<Outlet> kept_outlets_{};
   double kept_time_ = 0, kept_longest_step_ = 0;
   std::uint32_t kept_next_id_ = 0;
 };

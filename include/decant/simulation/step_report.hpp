@@ -99,6 +99,8 @@ struct StepReport {
   Index particles = 0;
   Index guarded = 0;               ///< steps that swept contact had to bend
   Index lost = 0;                  ///< particles that passed a wall because bodies left them no room, since the start
+  double drained = 0;              ///< volume that went out through outlets, since the start [m^3]; what goes on from an
+                                   ///< outlet's exit is in `volume` as well
   Index non_finite = 0;            ///< particles with a non-finite position or velocity (status NonFinite)
   ContentsList contents{};         ///< of the containers that are watched, at the end of the frame
   StepTimes times{};
