@@ -75,6 +75,7 @@ int main(int count, char** values) {
   return example::run_tool(app, count, values, [&] {
     example::SweepExecutor executor = example::sweep_executor(threads);
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
+    example::expect_apart(learn_folders, held_out_folders);
     options.model.spacing = 1e-3 * spacing_mm;
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
     const auto read = [&](const std::vector<std::string>& folders) {

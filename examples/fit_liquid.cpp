@@ -7,9 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <optional>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -107,25 +105,6 @@ void write_report(const std::string& file, const example::LiquidFit& fit) {
   report.write(file);
 }
 
-/// Throws std::runtime_error for a recording that is given twice, or held out of what it is learnt from.
-void expect_apart(const std::vector<std::string>& learn, const std::vector<std::string>& held_out) {
-  for (const auto& [option, folders] : {std::pair("--learn", &learn), std::pair("--held-out", &held_out)}) {
-    std::set<std::filesystem::path> different;
-    for (const std::string& folder : *folders) {
-      if (!different.insert(std::filesystem::weakly_canonical(folder)).second) {
-        throw std::runtime_error(std::string(option) + ": " + folder + " is given twice");
-      }
-    }
-  }
-  for (const std::string& other : held_out) {
-    for (const std::string& folder : learn) {
-      if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(other)) {
-        throw std::runtime_error("--held-out: " + other + " is among those that are learnt from");
-      }
-    }
-  }
-}
-
 }  // namespace
 
 int main(int count, char** values) {
@@ -162,7 +141,7 @@ int main(int count, char** values) {
     options.surrogate = method != "best_first";
     example::SweepExecutor executor = example::sweep_executor(threads);
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
-    expect_apart(learn_folders, held_out_folders);
+    example::expect_apart(learn_folders, held_out_folders);
     const std::vector<decant::ParameterAxis> axes = example::axes_of(options.parameters);
     tracking.spacing = 1e-3 * spacing_mm;
     tracking.threads = 1;

@@ -8,7 +8,11 @@
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
+#include <set>
+#include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -38,6 +42,25 @@ inline void expect_writable(std::initializer_list<std::string> files) {
   for (const std::string& file : files) {
     if (!file.empty()) {
       expect_writable(std::filesystem::path(file));
+    }
+  }
+}
+
+/// Throws std::runtime_error for a recording that is given twice, or held out of what it is learnt from.
+inline void expect_apart(const std::vector<std::string>& learn, const std::vector<std::string>& held_out) {
+  for (const auto& [option, folders] : {std::pair("--learn", &learn), std::pair("--held-out", &held_out)}) {
+    std::set<std::filesystem::path> different;
+    for (const std::string& folder : *folders) {
+      if (!different.insert(std::filesystem::weakly_canonical(folder)).second) {
+        throw std::runtime_error(std::string(option) + ": " + folder + " is given twice");
+      }
+    }
+  }
+  for (const std::string& other : held_out) {
+    for (const std::string& folder : learn) {
+      if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(other)) {
+        throw std::runtime_error("--held-out: " + other + " is among those that are learnt from");
+      }
     }
   }
 }
