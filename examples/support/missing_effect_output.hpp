@@ -47,7 +47,8 @@ inline nlohmann::json components_json(const Eigen::VectorXd& values) {
 inline std::string components_text(const Eigen::VectorXd& values) {
   std::string text;
   for (const double value : values) {
-    text += (text.empty() ? "" : ", ") + three_digits(value);
+    text += text.empty() ? "" : ", ";
+    text += three_digits(value);
   }
   return text;
 }
@@ -102,24 +103,32 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
     return "No gap between simulation and recordings beyond what is tolerated.";
   }
   if (result.verdict == Verdict::Unexplained) {
-    return "There is a gap that no effect of the catalogue explains" +
-           (result.refined.empty()
-                ? std::string(".")
-                : "; nearest is " + detail::effect_words(effects, result.refined.front()) + " (" +
-                      decant::detail::fixed_text(100 * result.refined.front().share, 0) + " % of what is reducible).");
+    std::string text = "There is a gap that no effect of the catalogue explains";
+    if (!result.refined.empty()) {
+      text += "; nearest is ";
+      text += detail::effect_words(effects, result.refined.front());
+      text += ", which explains ";
+      text += decant::detail::fixed_text(100 * result.refined.front().share, 0);
+      text += " % of what is reducible";
+    }
+    return text + ".";
   }
-  std::string text = result.verdict == Verdict::OneOf ? "Missing is one of" : "Missing:";
   if (result.verdict == Verdict::OneOf) {
+    std::string text = "Missing is one of";
     for (std::size_t k = 0; k < result.one_of.size(); ++k) {
-      text += (k > 0 ? ", " : " ") + effects.at(result.one_of[k]).words();
+      text += k > 0 ? ", " : " ";
+      text += effects.at(result.one_of[k]).words();
     }
     return text + ", which these recordings do not tell apart.";
   }
+  std::string text = "Missing:";
   for (std::size_t k = 0; k < result.found.size(); ++k) {
-    text += (k > 0 ? ", and " : " ") + detail::effect_words(effects, result.found[k]);
+    text += k > 0 ? ", and " : " ";
+    text += detail::effect_words(effects, result.found[k]);
   }
-  return text + ": with it the gap falls by " + decant::detail::fixed_text(100 * result.learn.share(), 0) +
-         " % of what is reducible.";
+  text += ": with it the gap falls by ";
+  text += decant::detail::fixed_text(100 * result.learn.share(), 0);
+  return text + " % of what is reducible.";
 }
 
 inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& effects,

@@ -103,14 +103,18 @@ inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& r
   std::string key = "seed " + std::to_string(run.seed) + (run.tolerated ? " tolerated" : "");
   for (const AppliedEffect& applied : run.effects) {
     const Effect& effect = effects.at(applied.effect);
-    key += ", " + effect.words() + " =";
+    key += ", ";
+    key += effect.words();
+    key += " =";
     for (const double strength : applied.strength) {
-      key += " " + text(strength);
+      key += ' ';
+      key += text(strength);
     }
     if (applied.place) {
       key += " at";
       for (const double x : *applied.place) {
-        key += " " + text(x);
+        key += ' ';
+        key += text(x);
       }
     }
   }
