@@ -102,21 +102,30 @@ struct PourContainer {
   decant::Vector3<double> lip;  ///< where liquid leaves when the container is turned about y [m]
 };
 
+/// A container turned on a lathe. @param inner outline of its inside, (distance from the axis, height) [m], from the
+/// middle of the floor up to the rim. @param wall thickness, measured level; below, of the floor [m].
+inline decant::Revolved turned_container(const std::vector<Eigen::Vector2d>& inner, double wall) {
+  std::vector<Eigen::Vector2d> profile;
+  profile.emplace_back(0, -wall);
+  for (std::size_t k = 1; k < inner.size(); ++k) {
+    profile.emplace_back(inner[k].x() + wall, inner[k].y() - (k == 1 ? wall : 0.0));
+  }
+  for (std::size_t k = inner.size(); k-- > 0;) {
+    profile.push_back(inner[k]);
+  }
+  return {profile};
+}
+
+/// Of the bottle's inside, as turned_container takes it.
+inline const std::vector<Eigen::Vector2d>& bottle_outline() {
+  static const std::vector<Eigen::Vector2d> inner{{0, 0},         {0.031, 0},     {0.033, 0.004}, {0.033, 0.085},
+                                                  {0.030, 0.098}, {0.021, 0.112}, {0.018, 0.120}, {0.018, 0.140}};
+  return inner;
+}
+
 inline PourContainer pour_container(const std::string& name) {
   if (name == "bottle") {
-    const double wall = 0.003;
-    // inner outline from the floor to the mouth, then back outside
-    const std::vector<Eigen::Vector2d> inner{{0, 0},         {0.031, 0},     {0.033, 0.004}, {0.033, 0.085},
-                                             {0.030, 0.098}, {0.021, 0.112}, {0.018, 0.120}, {0.018, 0.140}};
-    std::vector<Eigen::Vector2d> profile;
-    profile.emplace_back(0, -wall);
-    for (std::size_t k = 1; k < inner.size(); ++k) {
-      profile.emplace_back(inner[k].x() + wall, inner[k].y() - (k == 1 ? wall : 0.0));
-    }
-    for (std::size_t k = inner.size(); k-- > 0;) {
-      profile.push_back(inner[k]);
-    }
-    return {decant::Revolved{profile}.mesh(), {0.018, 0, 0.140}};
+    return {turned_container(bottle_outline(), 0.003).mesh(), {0.018, 0, 0.140}};
   }
   decant::expects(name == "cup", "PourTwin: container", "cup or bottle", name);
   const decant::Cup cup{0.032, 0.041, 0.09, 0.003};

@@ -153,6 +153,60 @@ decant::StepReport step_reality(Model& reality, double time, double recorded) {
   return report;
 }
 
+/// What a camera would see of a reality: its liquid's clean silhouette, behind its bodies.
+class TwinSight {
+ public:
+  /// @param reality has its bodies already. @param focus about where liquid will be [m].
+  template <class Model>
+  TwinSight(const decant::PinholeCamera& camera, const decant::Pose& camera_from_world,
+            const decant::Vector3<double>& focus, const Model& reality)
+      : camera_(camera),
+        camera_from_world_(camera_from_world),
+        threads_(reality.settings().threads),
+        sight_(decant::PosedCamera<decant::PinholeCamera>(camera, camera_from_world)),
+        // a film is wet between the particles that stand for it
+        drawing_(decant::DiscSplat<float>(static_cast<float>(0.62 * reality.spacing())),
+                 decant::GapClosing(static_cast<int>(
+                     std::lround(1.25 * camera.fx() * reality.spacing() / (camera_from_world * focus).z())))),
+        clean_(camera.height(), camera.width()) {
+    sight_.add_bodies(reality.bodies(), 0);
+  }
+
+  /// As the reality is now. Valid until the next look.
+  template <class Model>
+  const decant::Mask& look(const Model& reality) {
+    sight_.follow(reality.bodies(), reality.time());
+    unseen_.resize(static_cast<std::size_t>(reality.fluid().size()));
+    decant::find_hidden(sight_, reality.fluid().position, threads_, unseen_);
+    drawing_.render(reality.fluid().position, unseen_, camera_, camera_from_world_, clean_, threads_);
+    return clean_;
+  }
+
+ private:
+  decant::PinholeCamera camera_;
+  decant::Pose camera_from_world_;
+  decant::Threads threads_;
+  decant::RayOcclusion<decant::PinholeCamera> sight_;
+  decant::Silhouette<decant::DiscSplat<float>> drawing_;
+  decant::Mask clean_;
+  std::vector<std::uint8_t> unseen_{};
+};
+
+/// The header with a camera that does not move, and its size of images.
+inline decant::Recording with_camera(decant::Recording header, const decant::PinholeCamera& camera,
+                                     const decant::Pose& camera_from_world) {
+  header.width = camera.width();
+  header.height = camera.height();
+  decant::recording::View view;
+  view.fx = camera.fx();
+  view.fy = camera.fy();
+  view.cx = camera.cx();
+  view.cy = camera.cy();
+  view.camera_from_world = camera_from_world;
+  header.cameras.push_back({{view}});
+  return header;
+}
+
 /// How a recording goes wrong.
 struct RecordingErrors {
   bool poses = true, masks = true;
@@ -177,20 +231,11 @@ class TwinRecorder {
                const RecordingErrors& errors, const Model& reality)
       : folder_(folder),
         errors_(errors),
-        camera_(camera),
-        camera_from_world_(camera_from_world),
-        threads_(reality.settings().threads),
         writer_(folder, with_camera(std::move(header), camera, camera_from_world)),
-        sight_(decant::PosedCamera<decant::PinholeCamera>(camera, camera_from_world)),
-        // a film is wet between the particles that stand for it
-        drawing_(decant::DiscSplat<float>(static_cast<float>(0.62 * reality.spacing())),
-                 decant::GapClosing(static_cast<int>(
-                     std::lround(1.25 * camera.fx() * reality.spacing() / (camera_from_world * focus).z())))),
+        sight_(camera, camera_from_world, focus, reality),
         noise_(errors.seed),
         random_(101 * errors.seed + 3),
-        offset_seed_(static_cast<std::uint32_t>(random_())),
-        clean_(camera.height(), camera.width()) {
-    sight_.add_bodies(reality.bodies(), 0);
+        offset_seed_(static_cast<std::uint32_t>(random_())) {
     std::filesystem::create_directories(folder / "truth_mask");
   }
 
@@ -198,11 +243,8 @@ class TwinRecorder {
   template <class Model>
   void add_frame(Model& reality, const std::vector<TrackedBody>& bodies) {
     using namespace decant;
-    sight_.follow(reality.bodies(), reality.time());
-    unseen_.resize(static_cast<std::size_t>(reality.fluid().size()));
-    find_hidden(sight_, reality.fluid().position, threads_, unseen_);
-    drawing_.render(reality.fluid().position, unseen_, camera_, camera_from_world_, clean_, threads_);
-    write_png(folder_ / "truth_mask" / (decant::detail::six_digits(frame_) + ".png"), clean_);
+    const Mask& clean = sight_.look(reality);
+    write_png(folder_ / "truth_mask" / (decant::detail::six_digits(frame_) + ".png"), clean);
 
     recording::Frame recorded;
     for (std::size_t body = 0; body < bodies.size(); ++body) {
@@ -211,7 +253,7 @@ class TwinRecorder {
     recording::Shot shot;
     const bool dropped = errors_.masks && frame_ > 0 && random_() % 40 == 0;
     if (!dropped) {
-      shot.mask = errors_.masks ? noise_.apply(clean_) : clean_;
+      shot.mask = errors_.masks ? noise_.apply(clean) : clean;
     }
     recorded.shots.push_back(std::move(shot));
     writer_.add_frame(recorded);
@@ -225,20 +267,6 @@ class TwinRecorder {
   }
 
  private:
-  static decant::Recording with_camera(decant::Recording header, const decant::PinholeCamera& camera,
-                                       const decant::Pose& camera_from_world) {
-    header.width = camera.width();
-    header.height = camera.height();
-    decant::recording::View view;
-    view.fx = camera.fx();
-    view.fy = camera.fy();
-    view.cx = camera.cx();
-    view.cy = camera.cy();
-    view.camera_from_world = camera_from_world;
-    header.cameras.push_back({{view}});
-    return header;
-  }
-
   // a tracker's error: an offset that lasts, and a little that comes and goes
   decant::Pose tracked(const TrackedBody& body, std::uint32_t which) {
     if (!errors_.poses) {
@@ -251,17 +279,11 @@ class TwinRecorder {
 
   std::filesystem::path folder_;
   RecordingErrors errors_;
-  decant::PinholeCamera camera_;
-  decant::Pose camera_from_world_;
-  decant::Threads threads_;
   decant::RecordingWriter writer_;
-  decant::RayOcclusion<decant::PinholeCamera> sight_;
-  decant::Silhouette<decant::DiscSplat<float>> drawing_;
+  TwinSight sight_;
   MaskNoise noise_;
   std::mt19937 random_;
   std::uint32_t offset_seed_;
-  decant::Mask clean_;
-  std::vector<std::uint8_t> unseen_{};
   std::size_t frame_ = 0;
 };
 

@@ -1,0 +1,471 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// A twin of pours in which one effect is hidden that the model lacks, or an error of the measurement, or something
+/// that no model is told of: for workflows that are to name it. The reality has the model's family of solver, with
+/// another kernel, spacing and sub-steps, and differs from what was recorded by small errors that are tolerated.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/boundary/cavity.hpp>
+#include <decant/boundary/shapes.hpp>
+#include <decant/core/image.hpp>
+#include <decant/force/body_acceleration.hpp>
+#include <decant/force/linear_drag.hpp>
+#include <decant/force/quadratic_drag.hpp>
+#include <decant/force/suction.hpp>
+#include <decant/force/surface_tension.hpp>
+#include <decant/force/wall_adhesion.hpp>
+#include <decant/force/wall_friction.hpp>
+#include <decant/io/png.hpp>
+#include <decant/io/recording_writer.hpp>
+#include <decant/pressure/dfsph.hpp>
+#include <decant/simulation/fill.hpp>
+#include <decant/simulation/inlet.hpp>
+#include <decant/simulation/simulator.hpp>
+
+#include "drain.hpp"
+#include "effect_cases.hpp"
+#include "effect_forces.hpp"
+#include "effect_scenarios.hpp"
+#include "fattened_mask.hpp"
+#include "twin.hpp"
+
+namespace example {
+
+/// How a case is recorded. What a workflow gets depends on none of it but the spacing and the seconds.
+struct EffectRecordingSettings {
+  double spacing = 0.0043;                                   ///< of the reality's particles [m]
+  double longest = std::numeric_limits<double>::infinity();  ///< a pour is cut off there [s]
+  bool with_effect = true;   ///< false: the same errors and noise, but nothing is hidden
+  bool truth_masks = false;  ///< clean silhouettes beside the recording
+  static constexpr double frames_per_second = 30;
+};
+
+/// All effects are there, and cost nothing where they are zero.
+// SHEAR_THINNING: replace Viscosity by the force that has both, and set it in EffectReality::set_forces
+struct EffectRealityParts : RealityParts<decant::Dfsph<float>> {
+  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
+                            decant::LinearDrag<float>, decant::QuadraticDrag<float>, decant::BodyAcceleration<float>,
+                            decant::Suction<float>, decant::WallFriction<float>, decant::WallAdhesion<float>,
+                            decant::SurfaceTension<float>, BackPressure, Stirrer, StickyPatch, Puff, ShakingTable>;
+};
+
+/// What really happens in one pour of a case.
+class EffectReality {
+ public:
+  using Model = decant::Simulator<EffectRealityParts>;
+  /// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
+  /// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
+  static constexpr double spacing_of_strengths = 0.005;
+
+  /// @param effect that of the case, or nothing. @param recorded_volume what the recording will say [m^3].
+  EffectReality(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which, double recorded_volume,
+                double spacing)
+      : effect_(effect),
+        scenario_(effect_scenarios().at(hidden.scenario)),
+        container_(effect_container(scenario_.pours.at(which).container)),
+        errors_(tolerated_errors(hidden, which)),
+        container_motion_(true_container_motion(RecordedMotion(hidden.scenario, which))),
+        pan_motion_(true_pan_motion()),
+        model_(true_settings(spacing)) {
+    using namespace decant;
+    container_body_ = model_.add_body("container", container_.shape, PoseTrack(container_motion_.at(0)));
+    pan_body_ = model_.add_body("pan", scenario_.pan.shape(), pan_motion_);
+    set_lasting_forces();
+    const double amount = (1 + errors_.fill) * (1 + (effect_.is("fill") ? effect_.strength : 0));
+    filled_ = fill(model_, container_body_, FillAmount::volume(amount * recorded_volume));
+    model_.watch_contents(container_body_);
+    model_.watch_contents(pan_body_);
+    model_.set_motion(container_body_, container_motion_);
+    set_passing_forces();
+    add_sources_and_bodies();
+  }
+
+  const Model& model() const { return model_; }
+  const ToleratedErrors& errors() const { return errors_; }
+  double initial_volume() const { return filled_.volume; }           ///< [m^3]
+  double removed() const { return drain_ ? drain_->removed() : 0; }  ///< by a leak or a loss [m^3]
+  /// Where the effect is, what it does and when.
+  const nlohmann::json& description() const { return description_; }
+
+  /// Goes on to a time [s]. Throws std::runtime_error where it cannot.
+  decant::StepReport advance(double time) {
+    // short enough for drains to take single particles, and the same for all
+    constexpr double slice = 1.0 / 60;
+    const double start = model_.time();
+    const int slices = std::max(1, static_cast<int>(std::lround((time - start) / slice)));
+    decant::StepReport report;
+    for (int k = 1; k <= slices; ++k) {
+      const double before = model_.time(), end = k == slices ? time : start + (time - start) * k / slices;
+      report = step_reality(model_, end, end);
+      if (drain_) {
+        drain_->drain(model_, model_.time() - before);
+      }
+    }
+    // what has left the picture would fall faster and faster, and sub-steps get shorter with it
+    model_.remove_particles_if([&](decant::Index i) { return model_.fluid().position(2, i) < lowest_seen; });
+    return report;
+  }
+
+ private:
+  static constexpr float lowest_seen = -0.3F;  // [m]
+  static constexpr double samples_per_second = 200;
+
+  decant::SimulatorSettings true_settings(double spacing) const {
+    decant::SimulatorSettings settings;
+    settings.spacing = spacing;
+    settings.threads = {1};
+    settings.gravity *= 1 + (effect_.is("gravity") ? effect_.strength : 0);
+    settings.gravity += errors_.pull;
+    settings.liquid.dynamic_viscosity += effect_.is("viscosity") ? effect_.strength * settings.liquid.density : 0;
+    settings.liquid.surface_tension = effect_.is("surface_tension") ? effect_.strength : 0;
+    // between those that are handed in and for_tracking's
+    settings.courant_number = 1;
+    settings.stability_number = 0.35;
+    settings.tolerance_factor = 1.5;
+    return settings;
+  }
+
+  decant::PoseTrack true_container_motion(const RecordedMotion& recorded) const {
+    const double late = errors_.latency + (effect_.is("latency") ? effect_.strength : 0);
+    std::vector<decant::PoseTrack::Sample> samples;
+    const int count = static_cast<int>(std::ceil((recorded.plan().duration + 0.1) * samples_per_second));
+    for (int k = 0; k <= count; ++k) {
+      const double time = k / samples_per_second;
+      decant::Pose pose = recorded.smooth(time + late);  // what is recorded at t happened at t - late
+      pose.rotation = errors_.container_error.rotation * pose.rotation;
+      pose.translation += errors_.container_error.translation;
+      if (effect_.is("body_pose", "container")) {
+        pose.translation += 1e-3 * effect_.strength * effect_.direction;
+      }
+      samples.push_back({time, pose});
+    }
+    return decant::PoseTrack(std::move(samples));
+  }
+
+  decant::PoseTrack true_pan_motion() const {
+    decant::Pose pose;
+    pose.translation = errors_.pan_offset;
+    if (effect_.is("body_pose", "pan")) {
+      pose.translation += 1e-3 * effect_.strength * effect_.level_direction();
+    }
+    if (!effect_.is("sliding_pan")) {
+      return decant::PoseTrack(pose);
+    }
+    decant::Pose there = pose;
+    there.translation += 1e-3 * effect_.strength * effect_.level_direction();
+    return decant::PoseTrack({{effect_.onset, pose}, {effect_.until, there}});
+  }
+
+  double strength_if(const char* name) const { return effect_.is(name) ? effect_.strength : 0; }
+
+  // Under which liquid comes to rest before the recording begins.
+  void set_lasting_forces() {
+    using namespace decant;
+    const double layers = spacing_of_strengths / model_.spacing();
+    model_.force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
+    model_.force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
+    model_.force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
+    model_.force<WallAdhesion<float>>().strength = static_cast<float>(layers * layers * strength_if("wall_adhesion"));
+    if (effect_.is("lateral_force", "steady")) {
+      pull_sideways(0, 0);
+    }
+  }
+
+  void set_passing_forces() {
+    using namespace decant;
+    if (effect_.is("lateral_force", "window")) {
+      pull_sideways(effect_.onset, effect_.until);
+    } else if (effect_.is("suction")) {
+      // beside the jet, so that it is drawn aside and not caught
+      const Vector3<double> point =
+          scenario_.jet(0.55) + 0.045 * effect_.side * scenario_.across() + 0.008 * effect_.displacement;
+      Suction<float>& suction = model_.force<Suction<float>>();
+      suction.strength = static_cast<float>(effect_.strength);
+      suction.point = point.cast<float>();
+      say("world", point);
+    } else if (effect_.is("back_pressure")) {
+      BackPressure& air = model_.force<BackPressure>();
+      air.strength = effect_.strength;
+      air.frequency = effect_.frequency;
+      air.onset = effect_.onset - 0.3;
+      air.mouth = {0, 0, container_.lip.z()};
+      air.radius = container_.lip.x() + 0.002;
+      air.container = container_motion_;
+      say("container", air.mouth);
+      description_["reach_m"] = air.reach;
+      description_["frequency_hz"] = air.frequency;
+      description_["onset_s"] = air.onset;
+    } else if (effect_.is("stirrer")) {
+      Stirrer& stirrer = model_.force<Stirrer>();
+      stirrer.speed = effect_.side * effect_.strength;
+      stirrer.onset = effect_.onset;
+      stirrer.foot = scenario_.pan.floor_below(0.015 * effect_.displacement);
+      say("pan", stirrer.foot);
+      description_["onset_s"] = effect_.onset;
+    } else if (effect_.is("sticky_patch")) {
+      StickyPatch& patch = model_.force<StickyPatch>();
+      patch.rate = spacing_of_strengths / model_.spacing() * effect_.strength;
+      patch.body = container_body_;
+      patch.side = effect_.side * Vector3<double>::UnitY();
+      patch.motion = container_motion_;
+      say("container", {0, 0, 0});
+      description_["direction"] = vector_json(patch.side);
+    } else if (effect_.is("puff")) {
+      Puff& puff = model_.force<Puff>();
+      puff.strength = effect_.strength;
+      puff.from = effect_.onset;
+      puff.until = effect_.until;
+      puff.foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.015 * effect_.displacement);
+      say("pan", puff.foot);
+      say_window();
+    } else if (effect_.is("shaking_table")) {
+      ShakingTable& table = model_.force<ShakingTable>();
+      table.size = effect_.strength * effect_.level_direction();
+      table.frequency = effect_.frequency;
+      table.from = effect_.onset - 0.4;
+      say("world", {0, 0, 0});
+      description_["direction"] = vector_json(effect_.level_direction());
+      description_["frequency_hz"] = table.frequency;
+      description_["onset_s"] = table.from;
+    } else if (effect_.is("sliding_pan")) {
+      say("pan", {0, 0, 0});
+      description_["direction"] = vector_json(effect_.level_direction());
+      say_window();
+    } else if (effect_.is("body_pose")) {
+      const bool pan = effect_.variant == "pan";
+      say(pan ? "pan" : "container", {0, 0, 0});
+      description_["direction"] = vector_json(pan ? effect_.level_direction() : effect_.direction);
+    }
+  }
+
+  void add_sources_and_bodies() {
+    using namespace decant;
+    if (effect_.is("leak")) {
+      // where the liquid is while it is poured: in the wall below the lip
+      const Vector3<double> hole = container_.wall_below_lip(0.35 + 0.15 * effect_.displacement.x());
+      drain_.emplace(container_motion_, hole, 1e-6 * effect_.strength);
+      say("container", hole);
+    } else if (effect_.is("loss")) {
+      const Vector3<double> hole = scenario_.pan.floor_below(0.02 * effect_.displacement);
+      drain_.emplace(pan_motion_, hole, 1e-6 * effect_.strength);
+      say("pan", hole);
+    } else if (effect_.is("inflow")) {
+      InletSettings inlet;
+      const bool above = effect_.variant == "above the pan";
+      inlet.position = scenario_.pan.floor_below(0.35 * scenario_.pan.radius * effect_.side * scenario_.across() +
+                                                 0.015 * effect_.displacement);
+      inlet.position.z() += above ? 0.10 + 0.02 * effect_.displacement.z() : 0.03;
+      inlet.radius = 0.006;
+      const double flow = 1e-6 * effect_.strength;
+      inlet.flow = {{effect_.onset, flow}, {effect_.onset + 60, flow}};
+      model_.add_inlet(inlet, foreign_liquid);
+      say("world", inlet.position);
+      description_["radius_m"] = inlet.radius;
+      description_["direction"] = vector_json(inlet.direction);
+      description_["onset_s"] = effect_.onset;
+    } else if (effect_.is("obstacle", "mouth")) {
+      // a block on the inside of the wall, as high as it is wide, that ends level with the lip
+      const double edge = 1e-3 * effect_.strength;
+      const Vector3<double> corner(container_.lip.x(), 0.5 * edge, container_.lip.z());
+      add_block("container", corner - Vector3<double>::Constant(edge), corner, container_motion_);
+    } else if (effect_.is("obstacle", "pan")) {
+      const double edge = 1e-3 * effect_.strength;
+      const Vector3<double> foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.01 * effect_.displacement);
+      const Vector3<double> corner = foot - 0.5 * edge * Vector3<double>(1, 1, 0);
+      add_block("pan", corner, corner + Vector3<double>::Constant(edge), pan_motion_);
+    } else if (effect_.is("bump")) {
+      // the cap of a ball that sticks out of the floor, away from where the jet lands
+      const double height = 1e-3 * effect_.strength, radius = 0.032;
+      const Vector3<double> foot = scenario_.pan.floor_below(
+          0.5 * scenario_.pan.radius * effect_.side * scenario_.across() + 0.005 * effect_.displacement);
+      model_.add_body("bump", Sphere{foot + Vector3<double>(0, 0, height - radius), radius}, pan_motion_);
+      say("pan", foot);
+    }
+  }
+
+  void pull_sideways(double from, double until) {
+    auto& pull = model_.force<decant::BodyAcceleration<float>>();
+    const decant::Vector3<double> direction = effect_.level_direction();
+    pull.pull = (effect_.strength * direction).cast<float>();
+    description_["direction"] = vector_json(direction);
+    if (until > from) {
+      pull.from = from;
+      pull.until = until;
+      say_window();
+    }
+  }
+
+  void add_block(const char* where, const decant::Vector3<double>& low, const decant::Vector3<double>& high,
+                 const decant::PoseTrack& motion) {
+    model_.add_body("block", decant::Box{low, high}, motion);
+    say(where, 0.5 * (low + high));
+  }
+
+  static nlohmann::json vector_json(const decant::Vector3<double>& v) { return {v.x(), v.y(), v.z()}; }
+  // a place in the frame of a body, or of the world
+  void say(const char* where, const decant::Vector3<double>& position) {
+    description_["place"] = where;
+    description_["position_m"] = vector_json(position);
+  }
+  void say_window() {
+    description_["onset_s"] = effect_.onset;
+    description_["until_s"] = effect_.until;
+  }
+
+  static constexpr decant::Origin foreign_liquid = 100;
+
+  HiddenEffect effect_;
+  EffectScenario scenario_;
+  EffectContainer container_;
+  ToleratedErrors errors_;
+  decant::PoseTrack container_motion_, pan_motion_;
+  Model model_;
+  decant::BodyId container_body_ = 0, pan_body_ = 0;
+  decant::FillReport filled_{};
+  std::optional<Drain> drain_{};
+  nlohmann::json description_ = nlohmann::json::object();
+};
+
+/// The camera as it really is.
+inline std::pair<decant::PinholeCamera, decant::Pose> true_camera(const EffectScenario& scenario,
+                                                                  const HiddenEffect& effect) {
+  const decant::PinholeCamera camera = effect_camera();
+  decant::Pose camera_from_world = effect_camera_from_world(scenario);
+  if (effect.is("camera_shift", "roll")) {
+    const Eigen::Quaterniond roll(
+        Eigen::AngleAxisd(effect.strength * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
+    camera_from_world = decant::Pose{roll, {0, 0, 0}} * camera_from_world;
+  } else if (effect.is("camera_shift", "shift")) {
+    const decant::Vector3<double> shift = effect.strength * effect.level_direction();
+    return {decant::PinholeCamera(camera.fx(), camera.fy(), camera.cx() + shift.x(), camera.cy() + shift.y(),
+                                  camera.width(), camera.height()),
+            camera_from_world};
+  }
+  return {camera, camera_from_world};
+}
+
+/// The truth about a recording, for scoring alone.
+inline nlohmann::json effect_truth(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which,
+                                   const EffectReality& reality) {
+  const auto vector = [](const decant::Vector3<double>& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
+  const ToleratedErrors& errors = reality.errors();
+  const Eigen::AngleAxisd turn(errors.container_error.rotation);
+  nlohmann::json truth = reality.description();
+  truth["role"] = effect.is("nothing")           ? "nothing"
+                  : effect.family == "outside"   ? "outside"
+                  : hidden.kind == "measurement" ? "measurement"
+                                                 : "catalogue";
+  truth["effect"] = effect.name;
+  truth["family"] = effect.family;
+  if (!effect.is("nothing")) {
+    truth["strength"] = effect.strength;
+    truth["unit"] = effect.unit;
+    if (!effect.variant.empty()) {
+      truth["variant"] = effect.variant;
+    }
+  }
+  if (effect.is("camera_shift", "shift")) {
+    truth["direction_px"] = {std::cos(effect.angle), std::sin(effect.angle)};
+  }
+  truth["range"] = hidden.range;
+  truth["kind"] = hidden.kind;
+  truth["case"] = hidden.number;
+  truth["scenario"] = hidden.scenario;
+  truth["pour"] = which == 0 ? "a" : "b";
+  truth["seed"] = hidden.seed;
+  truth["tolerated"] = {{"latency_s", errors.latency},
+                        {"fill_share", errors.fill},
+                        {"pan_offset_m", vector(errors.pan_offset)},
+                        {"container_offset_m", vector(errors.container_error.translation)},
+                        {"container_turn_deg", turn.angle() * 180 / std::numbers::pi},
+                        {"pull_m_s2", vector(errors.pull)}};
+  truth["solver"] = "divergence-free, another kernel";
+  truth["spacing_mm"] = 1e3 * reality.model().spacing();
+  truth["initial_ml"] = 1e6 * reality.initial_volume();
+  return truth;
+}
+
+/// Records one pour of a case in a new folder. The recording's name tells the scenario and the pour, nothing else.
+/// @param which 0: a, to learn from; 1: b, to be predicted. @param progress is told how far it is, 0 .. 1.
+/// Throws std::invalid_argument and std::runtime_error.
+inline void record_effect_pour(
+    const EffectCase& hidden, std::size_t which, const std::filesystem::path& folder,
+    const EffectRecordingSettings& settings = {}, const std::function<void(double)>& progress = [](double) {}) {
+  using namespace decant;
+  const EffectScenario& scenario = effect_scenarios().at(hidden.scenario);
+  const PourPlan& plan = scenario.pours.at(which);
+  const HiddenEffect effect = settings.with_effect ? hidden.effect : HiddenEffect{};
+  const BodyShape container = effect_container(plan.container).shape;
+  const double recorded_volume = 1e-7 * std::round(1e7 * plan.fill * Cavity(container.mesh).volume());
+  EffectReality reality(hidden, effect, which, recorded_volume, settings.spacing);
+
+  Recording header;
+  header.name = "scenario" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
+  header.frames_per_second = settings.frames_per_second;
+  header.bodies.push_back({1, plan.container, recording::Role::Source, {}, container.mesh, {}});
+  header.bodies.push_back({2, "pan", recording::Role::Target, {}, scenario.pan.shape().mesh, {}});
+  header.liquid.initial = recording::Initial{0, std::nullopt, recorded_volume};
+  RecordingWriter writer(folder, with_camera(header, effect_camera(), effect_camera_from_world(scenario)));
+  if (settings.truth_masks) {
+    std::filesystem::create_directories(folder / "truth_mask");
+  }
+  const auto [camera, camera_from_world] = true_camera(scenario, effect);
+  TwinSight sight(camera, camera_from_world, {0, 0, 0}, reality.model());
+  RecordedMotion recorded(hidden.scenario, which);
+  const std::uint32_t noise_seed = detail::mixed_seed({hidden.seed, 99U, static_cast<std::uint32_t>(which)});
+  MaskNoise noise(noise_seed);
+  std::mt19937 drops(noise_seed);
+
+  nlohmann::json container_ml = nlohmann::json::array(), pan_ml = nlohmann::json::array();
+  const double seconds = std::min(plan.duration, settings.longest);
+  const int frames = std::max(1, static_cast<int>(std::lround(seconds * settings.frames_per_second)));
+  for (int number = 0; number < frames; ++number) {
+    const double time = number / settings.frames_per_second;
+    const StepReport report = reality.advance(time);
+    container_ml.push_back(1e6 * report.contents[0].volume);
+    pan_ml.push_back(1e6 * report.contents[1].volume);
+    Mask seen = sight.look(reality.model());
+    if (effect.is("mask_bias")) {
+      seen = fattened(seen, effect.strength);
+    }
+    if (settings.truth_masks) {
+      write_png(folder / "truth_mask" / (decant::detail::six_digits(static_cast<std::size_t>(number)) + ".png"), seen);
+    }
+    recording::Frame frame;
+    frame.bodies = {recorded.next_recorded(time), Pose{}};
+    frame.shots.emplace_back();
+    const Mask noisy = noise.apply(seen);
+    if (number == 0 || drops() % 40 != 0) {  // else a dropped frame
+      frame.shots.front().mask = noisy;
+    }
+    writer.add_frame(frame);
+    progress(static_cast<double>(number + 1) / frames);
+  }
+  nlohmann::json truth = effect_truth(hidden, effect, which, reality);
+  truth["recorded_ml"] = 1e6 * recorded_volume;
+  truth["removed_ml"] = 1e6 * reality.removed();
+  truth["volume_ml"] = {{plan.container, container_ml}, {"pan", pan_ml}};
+  writer.set_truth(truth.dump());
+  writer.finish();
+}
+
+}  // namespace example

@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: MIT
+// Which effects are hidden in which recordings, and the parts of a twin that stand on their own: forces that only it
+// has against their laws in numbers, holes through which liquid leaves, silhouettes that are fattened.
+
+#include "../../examples/support/effect_cases.hpp"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <numbers>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/cavity.hpp>
+#include <decant/testing/force.hpp>
+
+#include "../../examples/support/drain.hpp"
+#include "../../examples/support/effect_forces.hpp"
+#include "../../examples/support/fattened_mask.hpp"
+#include "catch.hpp"
+
+using namespace example;
+
+namespace {
+
+constexpr std::array case_ranges{CaseRange::Develop, CaseRange::Report};
+constexpr std::array kinds_of_effects{CaseKind::Moderate, CaseKind::Weak, CaseKind::Outside, CaseKind::Measurement};
+
+/// One particle, as a force sees it.
+struct LoneParticle {
+  decant::testing::LooseLiquid<decant::CubicSpline<float>> liquid;
+  decant::PointArray<float> acceleration = decant::PointArray<float>::Zero(3, 1);
+
+  LoneParticle(const decant::Vector3<double>& position, const decant::Vector3<double>& velocity) {
+    liquid.spacing = 0.005F;
+    liquid.smoothing_length = 0.005F;
+    liquid.time_step = 0.001F;
+    liquid.place(position.cast<float>());
+    liquid.fluid.velocity.col(0) = velocity.cast<float>();
+  }
+
+  template <class Force>
+  decant::Vector3<double> felt(Force force, double time) {
+    auto step = liquid.view();
+    step.time = time;
+    acceleration.setOnes();  // what is there is added to
+    force.accumulate(step, acceleration);
+    return acceleration.col(0).cast<double>() - decant::Vector3<double>::Ones();
+  }
+};
+
+/// What a Drain asks of a simulation.
+struct FewParticles {
+  std::vector<decant::Vector3<double>> places;
+  struct {
+    decant::PointArray<float> position;
+    decant::Index size() const { return position.cols(); }
+  } liquid;
+  double now = 0;
+
+  explicit FewParticles(std::size_t count, double first, double apart) {
+    liquid.position.resize(3, static_cast<decant::Index>(count));
+    for (decant::Index i = 0; i < liquid.size(); ++i) {
+      liquid.position.col(i) << static_cast<float>(first + apart * static_cast<double>(i)), 0, 0;
+    }
+  }
+  double spacing() const { return 0.01; }
+  double time() const { return now; }
+  auto& fluid() { return liquid; }
+  template <class Predicate>
+  void remove_particles_if(Predicate&& gone) {
+    decant::PointArray<float> kept(3, 0);
+    for (decant::Index i = 0; i < liquid.size(); ++i) {
+      if (!gone(i)) {
+        kept.conservativeResize(3, kept.cols() + 1);
+        kept.col(kept.cols() - 1) = liquid.position.col(i);
+      }
+    }
+    liquid.position = kept;
+  }
+};
+
+}  // namespace
+
+TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is the same each time") {
+  std::set<std::uint32_t> seeds;
+  std::size_t cases = 0;
+  std::map<CaseRange, std::set<std::size_t>> scenarios;
+  for (const CaseRange range : case_ranges) {
+    for (const CaseKind kind :
+         {CaseKind::Moderate, CaseKind::Weak, CaseKind::Nothing, CaseKind::Outside, CaseKind::Measurement}) {
+      for (int number = 0; number < 100; ++number) {
+        const EffectCase one = effect_case(range, kind, number), again = effect_case(range, kind, number);
+        CHECK((one.seed == again.seed && one.effect.name == again.effect.name &&
+               one.effect.strength == again.effect.strength && one.effect.displacement == again.effect.displacement));
+        seeds.insert(one.seed);
+        scenarios[range].insert(one.scenario);
+        ++cases;
+      }
+    }
+  }
+  for (std::uint32_t seed = 0; seed < 100; ++seed) {
+    seeds.insert(reference_case(0, seed).seed);
+    seeds.insert(reference_case(1, seed).seed);
+    cases += 2;
+  }
+  CHECK(seeds.size() == cases);
+  CHECK(scenarios[CaseRange::Develop] == std::set<std::size_t>{0, 1, 2, 3, 4});
+  CHECK(scenarios[CaseRange::Report] == std::set<std::size_t>{5, 6, 7, 8});
+  CHECK_THROWS_AS(effect_case(CaseRange::Develop, CaseKind::Weak, -1), std::invalid_argument);
+  CHECK_THROWS_AS(reference_case(effect_scenarios().size(), 1), std::invalid_argument);
+}
+
+TEST_CASE("effect cases: each effect comes equally often and in all scenarios, as strong as its kind says") {
+  for (const CaseRange range : case_ranges) {
+    for (const CaseKind kind : kinds_of_effects) {
+      const std::vector<EffectEntry>& entries = entries_of(kind);
+      const std::size_t rounds = 20 * scenarios_of(range).size();
+      std::map<std::string, std::map<std::size_t, std::size_t>> found;
+      std::map<std::string, std::set<bool>> signs;
+      for (std::size_t k = 0; k < rounds * entries.size(); ++k) {
+        const EffectCase hidden = effect_case(range, kind, static_cast<int>(k));
+        const EffectEntry& entry = entries[k % entries.size()];
+        REQUIRE(hidden.effect.name == entry.name);
+        ++found[entry.name][hidden.scenario];
+        signs[entry.name].insert(hidden.effect.strength > 0);
+        const bool roll = hidden.effect.variant == "roll";
+        const double factor = kind == CaseKind::Weak ? 0.5 : 1;
+        const double least = hidden.effect.is("camera_shift") ? (roll ? 0.5 : 2) : entry.least;
+        const double most = hidden.effect.is("camera_shift") ? (roll ? 1 : 6) : entry.most;
+        CHECK(std::abs(hidden.effect.strength) >= factor * least);
+        CHECK(std::abs(hidden.effect.strength) <= factor * most);
+        CHECK(hidden.effect.direction.norm() == Approx(1));
+      }
+      for (const EffectEntry& entry : entries) {
+        INFO(entry.name);
+        if (std::string(entry.name) == "back_pressure") {
+          for (const auto& [scenario, times] : found[entry.name]) {
+            CHECK(effect_container(effect_scenarios()[scenario].pours[0].container).neck);
+          }
+        } else {
+          CHECK(found[entry.name].size() == scenarios_of(range).size());
+          for (const auto& [scenario, times] : found[entry.name]) {
+            CHECK(times == 20);
+          }
+        }
+        const bool either = entry.either_sign || std::string(entry.name) == "camera_shift";
+        CHECK(signs[entry.name].size() == (either ? 2U : 1U));
+      }
+    }
+  }
+}
+
+TEST_CASE("effect cases: tolerated errors are within what is tolerated, and differ between pours") {
+  double latency = 0, offset = 0, turn = 0, pull = 0, fill = 0;
+  for (int number = 0; number < 300; ++number) {
+    const EffectCase hidden = effect_case(CaseRange::Develop, CaseKind::Nothing, number);
+    CHECK(hidden.effect.is("nothing"));
+    CHECK(tolerated_errors(hidden, 0).latency != tolerated_errors(hidden, 1).latency);
+    const ToleratedErrors errors = tolerated_errors(hidden, 0);
+    latency = std::max(latency, std::abs(errors.latency));
+    offset = std::max({offset, errors.pan_offset.norm(), errors.container_error.translation.norm()});
+    turn = std::max(turn, Eigen::AngleAxisd(errors.container_error.rotation).angle() * 180 / std::numbers::pi);
+    pull = std::max(pull, errors.pull.norm());
+    fill = std::max(fill, std::abs(errors.fill));
+  }
+  // of 300 even draws the largest is above 0.95 of the limit but for a chance of 2e-7
+  CHECK((latency > 0.0057 && latency <= 0.006));
+  CHECK((offset > 0.00095 && offset <= 0.0010001));
+  CHECK((turn > 0.285 && turn <= 0.30001));
+  CHECK((pull > 0.019 && pull <= 0.020001));
+  CHECK((fill > 0.0095 && fill <= 0.01));
+}
+
+TEST_CASE("effect scenarios: the lip stays in place, at rest for a quarter of a second, and what is recorded is near") {
+  for (std::size_t scenario = 0; scenario < effect_scenarios().size(); ++scenario) {
+    for (const std::size_t which : {0U, 1U}) {
+      RecordedMotion motion(scenario, which);
+      const PourPlan& plan = motion.plan();
+      const decant::Vector3<double> lip = effect_container(plan.container).lip;
+      CHECK((plan.duration >= 2.7 && plan.duration <= 3.2));
+      CHECK((plan.lip_height >= 0.15 && plan.lip_height <= 0.25));
+      CHECK((plan.fill >= 0.5 && plan.fill <= 0.8));
+      const decant::Pose first = motion.smooth(0);
+      for (int frame = 0; frame < 30 * plan.duration; ++frame) {
+        const double time = frame / 30.0;
+        const decant::Pose pose = motion.smooth(time), recorded = motion.next_recorded(time);
+        if (time <= 0.25) {
+          CHECK((pose.translation == first.translation && pose.rotation.coeffs() == first.rotation.coeffs()));
+        }
+        CHECK((pose * lip - effect_scenarios()[scenario].lip(which)).norm() <
+              0.006);  // three waves of 0.8 mm on 3 axes
+        CHECK((recorded.translation - pose.translation).norm() <= 0.0002 + 1e-12);
+        CHECK(recorded.rotation.angularDistance(pose.rotation) * 180 / std::numbers::pi <= 0.1 + 1e-6);
+      }
+      // the container's axis leans by the plan's last tilt, but for the tremor's 2 degrees
+      const double tilt = std::acos((motion.smooth(plan.duration).rotation * Eigen::Vector3d::UnitZ()).z());
+      CHECK(std::abs(tilt * 180 / std::numbers::pi - plan.tilt.back().tilt_deg) < 2);
+    }
+  }
+}
+
+TEST_CASE("effect scenarios: containers hold at first what any case fills in") {
+  for (std::size_t scenario = 0; scenario < effect_scenarios().size(); ++scenario) {
+    for (const std::size_t which : {0U, 1U}) {
+      const RecordedMotion motion(scenario, which);
+      const decant::BodyShape shape = effect_container(motion.plan().container).shape;
+      const auto surface = std::make_shared<const decant::BoundingVolumeHierarchy>(shape.mesh);
+      const double recorded = motion.plan().fill * decant::Cavity(surface).volume();
+      INFO("scenario " << scenario << ", pour " << which << ": " << 1e6 * recorded << " ml");
+      CHECK((recorded > 150e-6 && recorded < 260e-6));
+      const auto holds = [&](double pull) {  // toward where the container leans
+        const decant::Vector3<double> up = Eigen::Vector3d(0, 0, 9.81) - pull * effect_scenarios()[scenario].ahead();
+        return decant::Cavity(surface, motion.smooth(0).rotation.conjugate() * up).volume();
+      };
+      CHECK(holds(0) > 1.14 * 1.01 * recorded);
+      CHECK(holds(0.82) > 1.01 * recorded);
+    }
+  }
+}
+
+TEST_CASE("effect scenarios: the wall below the lip is where the outline has it") {
+  CHECK((effect_container("mug").wall_below_lip(0.5) - Eigen::Vector3d(0.040, 0, 0.040)).norm() < 1e-12);
+  CHECK((effect_container("cone_cup").wall_below_lip(0.25) - Eigen::Vector3d(0.030, 0, 0.025)).norm() < 1e-12);
+  // of the bowl's ball, radius R = (65^2 + 55^2) / 110 mm, between corners of its outline
+  const double ball = (0.065 * 0.065 + 0.055 * 0.055) / 0.11;
+  const decant::Vector3<double> place = effect_container("bowl").wall_below_lip(0.5);
+  CHECK(std::hypot(place.x(), place.z() - ball) == Approx(ball).epsilon(0.001));
+  CHECK_THROWS_AS(effect_container("sieve"), std::invalid_argument);
+  // a basin's, against its mesh
+  const EffectPan basin{EffectPan::Form::Basin, 0.12, 0.06};
+  const decant::BoundingVolumeHierarchy surface(basin.shape().mesh);
+  const auto below = surface.closest_point(basin.floor_below({0.05, -0.03, 0.3}), 0.01);
+  REQUIRE(below);
+  CHECK(below->distance < 1e-4);  // chords of the mesh are so near to the ball
+  CHECK(basin.floor_below({0.05, -0.03, 0.3}).head<2>() == Eigen::Vector2d(0.05, -0.03));
+  CHECK(EffectPan{}.floor_below({0.05, -0.03, 0.3}) == Eigen::Vector3d(0.05, -0.03, 0));
+}
+
+TEST_CASE("effect forces: air holds back what is in the neck, in pulses") {
+  BackPressure air;
+  air.strength = 8;
+  air.frequency = 2;
+  air.onset = 1;
+  air.mouth = {0, 0, 0.1};
+  decant::Pose lying{Eigen::Quaterniond(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitY())), {1, 0, 0}};
+  air.container = decant::PoseTrack(lying);  // its mouth is at x = 1.1, and opens toward +x
+  const auto felt = [&](double x, double z, double time) { return LoneParticle({x, 0, z}, {0, 0, 0}).felt(air, time); };
+  CHECK((felt(1.08, 0.01, 1.25) - Eigen::Vector3d(-8, 0, 0)).norm() < 1e-5);  // the middle of a pulse
+  CHECK((felt(1.08, 0.01, 1.125) - Eigen::Vector3d(-4, 0, 0)).norm() < 1e-5);
+  CHECK(felt(1.08, 0.01, 1.5).norm() < 1e-5);
+  CHECK(felt(1.08, 0.01, 0.75).norm() == 0);   // not yet
+  CHECK(felt(1.11, 0.01, 1.25).norm() == 0);   // outside
+  CHECK(felt(1.05, 0.01, 1.25).norm() == 0);   // behind the neck
+  CHECK(felt(1.08, 0.025, 1.25).norm() == 0);  // beside it
+}
+
+TEST_CASE("effect forces: a stirrer brings liquid to its own speed, a puff lifts it, a table shakes it") {
+  Stirrer stirrer;
+  stirrer.speed = -0.6;
+  stirrer.foot = {0.1, 0, 0};
+  const decant::Vector3<double> at_rim(0.1 + stirrer.radius, 0, 0.01);
+  CHECK((LoneParticle(at_rim, {0, 0, 0}).felt(stirrer, 1) - Eigen::Vector3d(0, -0.6 * stirrer.rate, 0)).norm() < 1e-4);
+  CHECK(LoneParticle(at_rim, {0, -0.6, 0}).felt(stirrer, 1).norm() < 1e-4);
+  CHECK(LoneParticle(at_rim + Eigen::Vector3d(0.05, 0, 0), {0, 0, 0}).felt(stirrer, 1).norm() == 0);
+
+  Puff puff;
+  puff.strength = 20;
+  puff.from = 1;
+  puff.until = 2;
+  CHECK((LoneParticle({0, puff.radius, 0}, {0, 0, 0}).felt(puff, 1.5) - Eigen::Vector3d(0, 0, 20 / std::numbers::e))
+            .norm() < 1e-4);
+  CHECK(LoneParticle({0, 0, 0}, {0, 0, 0}).felt(puff, 2.5).norm() == 0);
+
+  ShakingTable table;
+  table.size = {0, 3, 0};
+  table.frequency = 2.5;
+  table.from = 0.5;
+  CHECK((LoneParticle({0, 0, 0}, {0, 0, 0}).felt(table, 0.6) - Eigen::Vector3d(0, 3, 0)).norm() < 1e-5);
+  CHECK((LoneParticle({0, 0, 0}, {0, 0, 0}).felt(table, 0.8) - Eigen::Vector3d(0, -3, 0)).norm() < 1e-5);
+  CHECK(LoneParticle({0, 0, 0}, {0, 0, 0}).felt(table, 0.4).norm() == 0);
+}
+
+TEST_CASE("effect forces: a sticky patch slows liquid along one side of a wall") {
+  StickyPatch patch;
+  patch.rate = 500;
+  patch.body = 3;
+  patch.side = Eigen::Vector3d::UnitY();
+  const auto felt = [&](double y, std::uint32_t body) {
+    LoneParticle one({0, y, 0.0025}, {0.4, 0, -0.1});
+    auto& walls = one.liquid.walls;  // a floor that moves at 0.1 m/s
+    walls.distance[0] = 0.0025F;
+    walls.contact_count[0] = 1;
+    walls.contacts_of(0)->body = body;
+    walls.contacts_of(0)->gradient = {0, 0, -100};
+    walls.contacts_of(0)->velocity = {0.1F, 0, 0};
+    return one.felt(patch, 0);
+  };
+  const double after = 0.3 * std::exp(-0.5);  // slip after a sub-step of 1 ms
+  CHECK((felt(0.01, 3) - Eigen::Vector3d((after - 0.3) / 0.001, 0, 0)).norm() < 0.01);
+  CHECK(felt(-0.01, 3).norm() == 0);
+  CHECK(felt(0.01, 2).norm() == 0);
+}
+
+TEST_CASE("drain: takes the nearest at its flow, and no more later for what was not there") {
+  // particles of 1 cm^3, 2 mm apart from the hole on; 25 cm^3/s
+  FewParticles simulation(6, 0.5, 0.002);
+  Drain drain(decant::PoseTrack(decant::Pose{Eigen::Quaterniond::Identity(), {0.4, 0, 0}}), {0.1, 0, 0}, 25e-6);
+  drain.drain(simulation, 0.02);
+  CHECK(simulation.liquid.size() == 6);  // half a particle
+  drain.drain(simulation, 0.02);
+  REQUIRE(simulation.liquid.size() == 5);
+  CHECK(simulation.liquid.position(0, 0) == Approx(0.502));
+  drain.drain(simulation, 0.08);
+  CHECK(simulation.liquid.size() == 3);
+  CHECK(drain.removed() == Approx(3e-6));
+
+  FewParticles far(4, 0.6, 0.002);
+  drain.drain(far, 10);  // nothing within reach
+  CHECK(far.liquid.size() == 4);
+  FewParticles back(4, 0.5, 0.002);
+  drain.drain(back, 0.041);
+  CHECK(back.liquid.size() == 3);
+}
+
+TEST_CASE("fattened mask: a disc for each pixel, or one less of what is not liquid") {
+  decant::Mask mask = decant::Mask::Zero(20, 30);
+  mask(10, 15) = decant::mask_liquid;
+  mask(0, 0) = decant::mask_liquid;
+  const auto area = [](const decant::Mask& m) { return (m.cast<int>() / 255).sum(); };
+  CHECK(area(fattened(mask, 1)) == 5 + 3);  // a cross, and what of it is in the picture
+  CHECK(area(fattened(mask, 1.5)) == 9 + 4);
+  CHECK(area(fattened(mask, 2)) == 13 + 6);
+  CHECK((fattened(mask, 0) == mask).all());
+  CHECK(area(fattened(fattened(mask, 2), -2)) == 2);
+  CHECK(area(fattened(mask, -1)) == 0);
+  decant::Mask full = decant::Mask::Constant(20, 30, decant::mask_liquid);
+  CHECK((fattened(full, -2) == full).all());  // the picture's border is no edge of the liquid
+}
