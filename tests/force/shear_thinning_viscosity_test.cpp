@@ -79,22 +79,22 @@ double relative_error(const Points& are, const Points& should_be) {
          static_cast<double>(should_be.cwiseAbs().maxCoeff());
 }
 
-using Matrix = Eigen::Matrix3d;
+using Gradient = Eigen::Matrix3d;
 
 /// Simple shear of a rate, along and across directions that are nobody's axes.
-Matrix simple_shear(double rate) {
+Gradient simple_shear(double rate) {
   const decant::Vector3<double> along(2.0 / 3, -1.0 / 3, 2.0 / 3), across(1 / std::sqrt(2.0), 0, -1 / std::sqrt(2.0));
   return rate * along * across.transpose();
 }
 
-Matrix spin(const decant::Vector3<double>& omega) {
-  Matrix matrix;
+Gradient spin_matrix(const decant::Vector3<double>& omega) {
+  Gradient matrix;
   matrix << 0, -omega[2], omega[1], omega[2], 0, -omega[0], -omega[1], omega[0], 0;
   return matrix;
 }
 
 template <class Liquid>
-void move_linearly(Liquid& liquid, const Matrix& gradient, const decant::Vector3<double>& offset) {
+void move_linearly(Liquid& liquid, const Gradient& gradient, const decant::Vector3<double>& offset) {
   using Scalar = typename Liquid::Scalar;
   for (decant::Index i = 0; i < liquid.fluid.size(); ++i) {
     const decant::Vector3<double> x = liquid.fluid.position.col(i).template cast<double>();
@@ -102,9 +102,9 @@ void move_linearly(Liquid& liquid, const Matrix& gradient, const decant::Vector3
   }
 }
 
-/// What a float of about one keeps of differences that are a tenth of it.
+/// Neighbours' velocities are rounded, and differ by a tenth or so of what they are; a sum has some thirty.
 template <class Scalar>
-constexpr double rounding = 30.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+constexpr double linear_rounding = 30.0 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
 
 /// A disordered block of liquid that fills the gap between two plates, the upper of which moves, and both turn.
 template <class Scalar>
@@ -112,28 +112,28 @@ struct BetweenPlates {
   static constexpr double spacing = 0.005, height = 6 * spacing;
   decant::testing::LooseLiquid<decant::CubicSpline<Scalar>> liquid;
 
-  BetweenPlates(double shear_rate, const decant::Vector3<double>& omega, decant::Slip slip) {
+  /// @param per_height velocity of the lid over its height.
+  BetweenPlates(const decant::Vector3<double>& per_height, const decant::Vector3<double>& omega, decant::Slip slip) {
     const auto places = decant_test::block<Scalar>({-4 * spacing, -4 * spacing, 0}, 8, 8, 6, spacing, 0.2);
     liquid.template place<decant::CellGrid<Scalar>>(places);
-    Matrix shear = Matrix::Zero();
-    shear(0, 2) = shear_rate;
-    move_linearly(liquid, shear + spin(omega), {0, 0, 0});
+    Gradient gradient = spin_matrix(omega);
+    gradient.col(2) += per_height;
+    move_linearly(liquid, gradient, {0, 0, 0});
 
     const double time_step = 1e-4;
-    const auto turned = [&](double x) {
+    const auto turned = [&](const decant::Vector3<double>& moved) {
       const double angle = omega.norm() * time_step;
       const decant::Vector3<double> axis =
           angle > 0 ? decant::Vector3<double>(omega.normalized()) : decant::Vector3<double>(0, 0, 1);
       return decant::PoseTrack(
-          {{0, decant::Pose{}},
-           {time_step, decant::Pose{Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), {x, 0, 0}}}});
+          {{0, decant::Pose{}}, {time_step, decant::Pose{Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), moved}}});
     };
     decant::RigidBodies<Scalar> bodies;
     using Kernel = decant::CubicSpline<Scalar>;
-    bodies.template add<Kernel>("floor", decant::Box{{-1, -1, -0.1}, {1, 1, 0}}, turned(0), slip, spacing, spacing,
-                                {1});
+    bodies.template add<Kernel>("floor", decant::Box{{-1, -1, -0.1}, {1, 1, 0}}, turned({0, 0, 0}), slip, spacing,
+                                spacing, {1});
     bodies.template add<Kernel>("lid", decant::Box{{-1, -1, height}, {1, 1, height + 0.1}},
-                                turned(time_step * shear_rate * height), slip, spacing, spacing, {1});
+                                turned(time_step * height * per_height), slip, spacing, spacing, {1});
     bodies.set_interval(0, time_step);
     bodies.sample(places, spacing, {1}, liquid.walls);
     liquid.template update<decant::CellGrid<Scalar>>();
@@ -146,12 +146,12 @@ struct ThinningParts : decant::PeriodicParts<float> {
 };
 
 /// Flow between plates that a constant pull drives, at Re = 20 by the viscosity at the wall.
-class Channel {
+class ThinningChannel {
  public:
   static constexpr double height = 0.1, wall_shear_rate = 4;
 
   /// @param thinning lambda times the shear rate at the wall.
-  Channel(double n, double thinning) {
+  ThinningChannel(double n, double thinning) {
     const double at_wall = wall_shear_rate * height * height / 80;
     liquid_ = {at_wall * std::pow(1 + thinning * thinning, 0.5 * (1 - n)), 0, thinning / wall_shear_rate, n};
     pull_ = 2 * at_wall * wall_shear_rate / height;
@@ -229,7 +229,7 @@ class Channel {
   std::vector<double> speed_{};       // up to the middle
 };
 
-double largest(const std::vector<double>& errors) {
+double largest_error(const std::vector<double>& errors) {
   double worst = 0;
   for (const double error : errors) {
     worst = std::max(worst, std::abs(error));
@@ -252,7 +252,7 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity keeps the laws of a force", "", flo
 TEMPLATE_TEST_CASE("shear-thinning viscosity that does not thin is Viscosity bit by bit", "", float, double) {
   using Scalar = TestType;
   const Scalar nan = std::numeric_limits<Scalar>::quiet_NaN(), inf = std::numeric_limits<Scalar>::infinity();
-  BetweenPlates<Scalar> between(30, {1, 2, 3}, decant::Slip::None);
+  BetweenPlates<Scalar> between({30, 0, 0}, {1, 2, 3}, decant::Slip::None);
   const Scalar nu = Scalar(1e-3);
   const auto expected = accelerations_by(between.liquid, newtonian<Scalar>(1e-3));
   decant::ShearThinningViscosity<Scalar> force;
@@ -285,7 +285,7 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity that does not thin is Viscosity bit
 }
 
 TEMPLATE_TEST_CASE("shear-thinning viscosity of zero leaves everything as it is", "", float, double) {
-  BetweenPlates<TestType> between(30, {1, 2, 3}, decant::Slip::None);
+  BetweenPlates<TestType> between({30, 0, 0}, {1, 2, 3}, decant::Slip::None);
   for (const double nothing : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     const auto force = Thinning{nothing, 0, 1, 0.3}.force<TestType>();
     CHECK(accelerations_by(between.liquid, force).cwiseAbs().maxCoeff() == 0);
@@ -303,12 +303,12 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity is that of the shear rate, out to f
       move_linearly(liquid, simple_shear(shear_rate), {0, 0, 0});
       CHECK(relative_error(accelerations_by(liquid, material.force<Scalar>()),
                            accelerations_by(liquid, newtonian<Scalar>(material.viscosity(shear_rate)))) <
-            rounding<Scalar>);
-      const Matrix turning = spin({2 * shear_rate, shear_rate, -3 * shear_rate});
+            linear_rounding<Scalar>);
+      const Gradient turning = spin_matrix({2 * shear_rate, shear_rate, -3 * shear_rate});
       move_linearly(liquid, simple_shear(shear_rate) + turning, {shear_rate * 0.01, 0, 0});
       CHECK(relative_error(accelerations_by(liquid, material.force<Scalar>()),
                            accelerations_by(liquid, newtonian<Scalar>(material.viscosity(shear_rate)))) <
-            10 * rounding<Scalar>);
+            10 * linear_rounding<Scalar>);
     }
   }
   // and of stretching, (1, -1/2, -1/2) times a rate has g = sqrt(3) of it
@@ -316,7 +316,7 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity is that of the shear rate, out to f
   move_linearly(liquid, decant::Vector3<double>(20, -10, -10).asDiagonal(), {0, 0, 0});
   CHECK(relative_error(accelerations_by(liquid, material.force<Scalar>()),
                        accelerations_by(liquid, newtonian<Scalar>(material.viscosity(20 * std::sqrt(3.0))))) <
-        rounding<Scalar>);
+        linear_rounding<Scalar>);
 }
 
 TEMPLATE_TEST_CASE("shear-thinning viscosity has the stress nu(g) g in simple shear", "", float, double) {
@@ -329,7 +329,7 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity has the stress nu(g) g in simple sh
   liquid.place(decant_test::block<Scalar>({0, 0, -0.02}, width, width, layers, 0.005));
   const Thinning material{1e-2, 1e-5, 0.5, 0.4};
   for (const double shear_rate : {1e-3, 0.1, 2.0, 20.0, 1e3, 1e5}) {
-    Matrix shear = Matrix::Zero();
+    Gradient shear = Gradient::Zero();
     shear(0, 2) = shear_rate;
     move_linearly(liquid, shear, {0, 0, 0});
     const auto acceleration = accelerations_by(liquid, material.force<Scalar>());
@@ -349,14 +349,20 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity at walls is that of the shear rate,
   for (const decant::Slip slip : {decant::Slip::None, decant::Slip::Free}) {
     for (const double shear_rate : {1.0, 30.0, 1e3}) {
       for (const double turning : {0.0, 3.0}) {
-        BetweenPlates<Scalar> between(shear_rate, turning * shear_rate * decant::Vector3<double>(0.6, -0.8, 1), slip);
+        BetweenPlates<Scalar> between({shear_rate, 0, 0}, turning * shear_rate * decant::Vector3<double>(0.6, -0.8, 1),
+                                      slip);
         // bodies' velocities are differences of poses 1e-4 s apart, which have 16 digits
         CHECK(relative_error(accelerations_by(between.liquid, material.force<Scalar>()),
                              accelerations_by(between.liquid, newtonian<Scalar>(material.viscosity(shear_rate)))) <
-              std::max(10 * rounding<Scalar>, 1e-9));
+              std::max(10 * linear_rounding<Scalar>, 1e-9));
       }
     }
   }
+  // plates that approach each other squeeze: D is the rate along their normal
+  BetweenPlates<Scalar> squeezed({0, 0, -30}, {10, 20, 30}, decant::Slip::None);
+  CHECK(relative_error(accelerations_by(squeezed.liquid, material.force<Scalar>()),
+                       accelerations_by(squeezed.liquid, newtonian<Scalar>(material.viscosity(30 * std::sqrt(2.0))))) <
+        std::max(10 * linear_rounding<Scalar>, 1e-9));
 }
 
 TEMPLATE_TEST_CASE("a single layer of shear-thinning liquid that slides on a plate shears as the plate says", "", float,
@@ -372,11 +378,11 @@ TEMPLATE_TEST_CASE("a single layer of shear-thinning liquid that slides on a pla
   bodies.set_interval(0, 0);
   bodies.sample(places, spacing, {1}, liquid.walls);
   liquid.update();
-  move_linearly(liquid, Matrix::Zero(), {0.3, 0.4, 0});
+  move_linearly(liquid, Gradient::Zero(), {0.3, 0.4, 0});
   const Thinning material{1e-4, 0, 0.1, 0.3};
   CHECK(relative_error(accelerations_by(liquid, material.force<Scalar>()),
                        accelerations_by(liquid, newtonian<Scalar>(material.viscosity(0.5 / (0.5 * spacing))))) <
-        10 * rounding<Scalar>);
+        10 * linear_rounding<Scalar>);
 }
 
 TEST_CASE("shear-thinning viscosity of a pair is the mean of what both have, in any motion") {
@@ -388,7 +394,7 @@ TEST_CASE("shear-thinning viscosity of a pair is the mean of what both have, in 
   std::vector<bool> surrounded(viscosity.size());
   for (decant::Index i = 0; i < count; ++i) {
     // the gradient that makes sum_j V_j (-W'/r) |v_i - v_j - G x_ij|^2 least
-    Matrix moment = Matrix::Zero(), change = Matrix::Zero();
+    Gradient moment = Gradient::Zero(), change = Gradient::Zero();
     step.neighbors.for_each(i, [&](decant::Index j, const decant::Vector3<double>& x, double r_squared) {
       const double r = std::sqrt(r_squared);
       const double weight = -1.25e-7 * decant::CubicSpline<double>::derivative(r, step.smoothing_length) / r;
@@ -397,9 +403,9 @@ TEST_CASE("shear-thinning viscosity of a pair is the mean of what both have, in 
       change += weight * apart * x.transpose();
     });
     const auto k = static_cast<std::size_t>(i);
-    surrounded[k] = Eigen::SelfAdjointEigenSolver<Matrix>(moment).eigenvalues().minCoeff() > 0.1;
-    const Matrix gradient = change * moment.inverse();
-    const Matrix strain = 0.5 * (gradient + gradient.transpose());
+    surrounded[k] = Eigen::SelfAdjointEigenSolver<Gradient>(moment).eigenvalues().minCoeff() > 0.1;
+    const Gradient gradient = change * moment.inverse();
+    const Gradient strain = 0.5 * (gradient + gradient.transpose());
     viscosity[k] = material.viscosity(std::sqrt(2 * (strain * strain).trace()));
   }
   const auto acceleration = accelerations_by(liquid, material.force<double>());
@@ -448,7 +454,7 @@ TEMPLATE_TEST_CASE("shear-thinning viscosity is finite in any state", "", float,
   }
   CHECK(accelerations_by(liquid, force).allFinite());
   // at walls that touch, have no slope, or face each other
-  BetweenPlates<Scalar> between(30, {0, 0, 0}, decant::Slip::None);
+  BetweenPlates<Scalar> between({30, 0, 0}, {0, 0, 0}, decant::Slip::None);
   for (decant::Index i = 0; i < between.liquid.fluid.size(); ++i) {
     auto* contacts = between.liquid.walls.contacts_of(i);
     between.liquid.walls.contact_count[i] = 2;
@@ -487,16 +493,17 @@ TEST_CASE("shear-thinning viscosity takes its zero-shear viscosity from the liqu
 }
 
 TEST_CASE("shear-thinning liquid that is pushed between plates flows as the power law says") {
-  const Channel newtonian(1, 1);
-  CHECK(newtonian.peak() == Approx(0.5 * 0.05 * Channel::wall_shear_rate).epsilon(1e-4));
+  const ThinningChannel newtonian(1, 1);
+  CHECK(newtonian.peak() == Approx(0.5 * 0.05 * ThinningChannel::wall_shear_rate).epsilon(1e-4));
   const std::vector<double> of_newtonian = newtonian.errors(8);
-  CHECK(largest(of_newtonian) < 0.05);
+  CHECK(largest_error(of_newtonian) < 0.05);
   for (const double n : {0.3, 0.6}) {
     // what is compared with: u = n / (n + 1) H/2 g_wall in the middle if all of it thins
-    CHECK(Channel(n, 1e4).peak() == Approx(n / (n + 1) * 0.05 * Channel::wall_shear_rate).epsilon(1e-3));
-    const std::vector<double> of_thinning = Channel(n, 30).errors(8);
+    CHECK(ThinningChannel(n, 1e4).peak() ==
+          Approx(n / (n + 1) * 0.05 * ThinningChannel::wall_shear_rate).epsilon(1e-3));
+    const std::vector<double> of_thinning = ThinningChannel(n, 30).errors(8);
     CAPTURE(n, of_newtonian, of_thinning);
     // where stress is g^n, stress that is wrong by one per cent makes a flow that is wrong by 1/n per cent
-    CHECK(largest(of_thinning) < largest(of_newtonian) / n);
+    CHECK(largest_error(of_thinning) < largest_error(of_newtonian) / n);
   }
 }

@@ -386,8 +386,12 @@ TEMPLATE_TEST_CASE("outlet: a box with a hole drains at the flow that is asked f
                    DefaultParts<float>, DefaultParts<double>, PositionBasedParts<float>) {
   const double rate = 1e-4, area = 0.048 * 0.048;  // [m^3/s], [m^2]
   auto simulator = box_to_drain<TestType>(10);
-  auto sinking = hole_in_floor({{0.1, rate}, {0.7, rate}});
-  simulator.add_outlet(sinking);
+  auto outlet = hole_in_floor({{0.1, rate}, {0.7, rate}});
+  if (GENERATE(false, true)) {
+    outlet.order = OutletOrder::Evenly;
+    outlet.radius = everywhere;
+  }
+  simulator.add_outlet(outlet);
   const double before = 640 * one_particle;
   for (int k = 1; k <= 40; ++k) {
     const StepReport report = simulator.step(0.02);
@@ -401,12 +405,10 @@ TEMPLATE_TEST_CASE("outlet: a box with a hole drains at the flow that is asked f
     REQUIRE(report.lost == 0);
     // the surface stands at twice the mean height of liquid that fills the box below it
     const double level = 2 * static_cast<double>(simulator.fluid().position.row(2).mean());
-    UNSCOPED_INFO("level " << level << " expected " << (before - report.drained) / area << " speed "
-                           << simulator.fluid().velocity.colwise().norm().maxCoeff());
     CHECK(std::abs(level - (before - report.drained) / area) < 0.5 * outlet_spacing);
+    // nothing that fills the gaps is faster than what falls from the surface
+    CHECK(simulator.fluid().velocity.colwise().norm().maxCoeff() < std::sqrt(2 * 9.81 * before / area));
   }
-  // in a hemisphere that takes 29 % more than the hole's flow at one spacing liquid moves at 0.44 m/s
-  CHECK(simulator.fluid().velocity.colwise().norm().maxCoeff() < 0.5);
 }
 
 TEST_CASE("outlet: one that moves with its body drains it wherever it is") {
@@ -486,7 +488,7 @@ TEMPLATE_TEST_CASE("outlet: what goes on from an exit is the same liquid, and fa
       const Vector3<double> v = fluid.velocity.col(i).template cast<double>();
       REQUIRE(fluid.origin[i] == 5);
       if (x.z() > 0) {
-        REQUIRE(v.norm() < 0.5);  // as in the box that drains at 1e-4 m^3/s
+        REQUIRE(v.norm() < std::sqrt(2 * g * 6 * outlet_spacing));  // as if fallen from the surface
         continue;
       }
       ++below;

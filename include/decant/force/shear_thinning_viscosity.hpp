@@ -33,21 +33,20 @@ namespace decant::inline DECANT_TARGET {
 ///
 /// The gradient that a particle sees is what fits its neighbours' velocities best,
 ///   G_i = [sum_j V_j (-W'/r) v_ij x_ij^T] A_i^-1,   A_i = sum_j V_j (-W'/r) x_ij x_ij^T,   V_j = m_j / rho_0
-/// (Bonet and Lok 1999, CMAME 180), with the inverse itself and not the short series of
-/// GradientCorrection: velocities that vary linearly have their shear rate to rounding, out to the free surface, and
-/// rigid rotation has none. In directions in which there is hardly a neighbour the liquid counts as not sheared. At a
-/// wall that holds the liquid, of normal n and at the distance a, the slip u along and across it says more about D n
-/// than neighbours on one side do: the two are averaged, the wall's part with the weight 2 |grad share| a against
-/// n . A n, so that each counts inversely to how far off it looks, as for a second-order difference. Walls without
-/// friction say nothing. Motion from particle to particle counts as shear: liquid that splashes is thinner than it
-/// should be.
+/// (Bonet and Lok 1999, CMAME 180), with the inverse itself and not the short series of GradientCorrection: velocities
+/// that vary linearly have their shear rate to rounding, out to the free surface, and rigid rotation has none. In
+/// directions in which there is hardly a neighbour the liquid counts as not sheared. At a wall that holds the liquid,
+/// of normal n and at the distance a, the velocity u past it says more about D n than neighbours on one side do: the
+/// two are averaged, the wall's part with the weight 2 |grad share| a against n . A n, so that each counts inversely to
+/// how far off it looks, as for a second-order difference. Walls without friction say nothing. Motion from particle to
+/// particle counts as shear: liquid that splashes is thinner than it should be.
 ///
-/// Of a pair, nu is the mean of both, and at a wall of the particle's and that of the shear rate u / a. A plain mean,
-/// where Cleary and Monaghan 1999 (J. Comput. Phys. 148) have the harmonic one, since nothing jumps here as between two
-/// materials: where the shear rate grows toward a wall, gradients over a spacing's distance overrate it, and the mean
-/// overrates viscosity by about as much. Between plates, with n = 0.3 and lambda g = 30 at the wall, liquid in 16
-/// layers is off by at most 1.3 % of its peak speed (4.9 % with the geometric mean, 8.1 % with the harmonic one) and in
-/// 8 layers by 2.7 %, where Newtonian liquid is off by 0.7 and 2.2 %.
+/// Of a pair, nu is the mean of both, and at a wall of the particle's and that of the shear rate u / a along it. A
+/// plain mean, where Cleary and Monaghan 1999 (J. Comput. Phys. 148) have the harmonic one, since nothing jumps here as
+/// between two materials: where the shear rate grows toward a wall, gradients over a spacing's distance overrate it,
+/// and the mean overrates viscosity by about as much. Between plates, with n = 0.3 and lambda g = 30 at the wall,
+/// liquid in 16 layers is off by at most 1.3 % of its peak speed (4.9 % with the geometric mean, 8.1 % with the
+/// harmonic one) and in 8 layers by 2.7 %, where Newtonian liquid is off by 0.7 and 2.2 %.
 ///
 /// Parameters out of range, NaN included, do not thin (a nu_inf below zero counts as zero). Liquid that does not thin,
 /// n = 1 or lambda = 0 or nu_inf >= nu_0, is left to Viscosity and costs and moves as that does, bit by bit; nu_0 = 0
