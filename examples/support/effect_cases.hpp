@@ -80,7 +80,7 @@ inline const std::vector<EffectEntry>& outside_effects() {
       {"stirrer", "outside", "m/s", 0.5, 0.8},       // in the pan
       {"sticky_patch", "outside", "1/s", 150, 300},  // on one side of the container; at a spacing of 5 mm
       {"bump", "outside", "mm", 18, 25},             // in the pan, so high
-      {"puff", "outside", "m/s^2", 35, 50},
+      {"puff", "outside", "m/s^2", 25, 38},
       {"shaking_table", "outside", "m/s^2", 2, 3},
       {"sliding_pan", "outside", "mm", 20, 30},
   };

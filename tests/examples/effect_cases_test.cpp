@@ -268,6 +268,8 @@ TEST_CASE("effect forces: a stirrer brings liquid to its own speed, a puff lifts
   const decant::Vector3<double> at_rim(0.1 + stirrer.radius, 0, 0.01);
   CHECK((LoneParticle(at_rim, {0, 0, 0}).felt(stirrer, 1) - Eigen::Vector3d(0, -0.6 * stirrer.rate, 0)).norm() < 1e-4);
   CHECK(LoneParticle(at_rim, {0, -0.6, 0}).felt(stirrer, 1).norm() < 1e-4);
+  const decant::Vector3<double> beside(0.1, stirrer.radius, 0.01);
+  CHECK((LoneParticle(beside, {0, 0, 0}).felt(stirrer, 1) - Eigen::Vector3d(0.6 * stirrer.rate, 0, 0)).norm() < 1e-4);
   CHECK(LoneParticle(at_rim + Eigen::Vector3d(0.05, 0, 0), {0, 0, 0}).felt(stirrer, 1).norm() == 0);
 
   Puff puff;
