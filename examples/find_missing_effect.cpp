@@ -20,10 +20,10 @@
 #include <decant/io/journal.hpp>
 #include <decant/io/progress.hpp>
 #include <decant/io/recording_reader.hpp>
-#include <decant/io/report.hpp>
 #include <decant/version.hpp>
 
 #include "support/missing_effect_output.hpp"
+#include "support/missing_effect_report.hpp"
 #include "support/recorded_interaction.hpp"
 #include "support/result_file.hpp"
 #include "support/sweep_executor.hpp"
@@ -32,23 +32,6 @@
 namespace {
 
 using Interactions = std::vector<decant::Interaction<example::RecordedModel>>;
-
-void write_report(const std::string& file, const std::vector<decant::Effect>& effects,
-                  const std::vector<std::string>& recordings, const decant::MissingEffect& result) {
-  decant::HtmlReport report("What the model lacks");
-  report.paragraph(example::missing_effect_sentence(effects, result));
-  for (const decant::RefinedEffect& each : result.found) {
-    report.paragraph(effects[each.effect].words() + ": " + effects[each.effect].meaning +
-                     ". In the model: " + example::detail::effect_code(effects, each));
-  }
-  report.heading("The gap");
-  report.table(example::gap_table(result));
-  report.heading("Where");
-  report.table(example::where_table(recordings, result));
-  report.heading("Candidates");
-  report.table(example::candidates_table(effects, result));
-  report.write(file);
-}
 
 }  // namespace
 
@@ -65,7 +48,7 @@ int main(int count, char** values) {
   app.add_option("--held-out", held_out_folders, "folders of other recordings that have it, to check on");
   app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
   app.add_option("--json", json_file, "writes what was found");
-  app.add_option("--report", report_file, "writes a page with tables, for a browser");
+  app.add_option("--report", report_file, "writes a page with a film, charts and tables, for a browser");
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--draws", settings.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
@@ -83,7 +66,7 @@ int main(int count, char** values) {
       for (const std::string& folder : folders) {
         kept.push_back(std::make_unique<example::RecordedInteraction>(
             example::recorded_interaction(decant::read_recording(folder), options)));
-        interactions.push_back({folder, &kept.back()->model, kept.back()->seen});
+        interactions.push_back(kept.back()->interaction(folder));
       }
       return interactions;
     };
@@ -127,7 +110,11 @@ int main(int count, char** values) {
         example::write_result(json_file, json);
       }
       if (!report_file.empty()) {
-        write_report(report_file, effects, learn_folders, result);
+        std::vector<const example::RecordedInteraction*> interactions;
+        for (const auto& each : kept) {
+          interactions.push_back(each.get());
+        }
+        example::write_missing_effect_report(report_file, interactions, learn_folders.size(), result);
       }
     });
     return 0;

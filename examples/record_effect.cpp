@@ -7,10 +7,8 @@
 
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <map>
-#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -18,6 +16,7 @@
 #include <decant/io/progress.hpp>
 
 #include "support/effect_twin.hpp"
+#include "support/tool.hpp"
 
 namespace {
 
@@ -77,13 +76,13 @@ int main(int count, char** values) {
   }
   settings.spacing = 1e-3 * spacing_mm;
   settings.with_effect = !without;
-  try {
+  return example::run_recorder([&] {
     if (list) {
       for (int k = 0; k < usual_cases(range, kind); ++k) {
         const example::EffectCase each = example::effect_case(range, kind, k);
         std::printf("%s %s %d: scenario %zu\n", each.range.c_str(), each.kind.c_str(), k, each.scenario);
       }
-      return 0;
+      return;
     }
     const example::EffectCase hidden =
         plain ? example::reference_case(scenario, seed) : example::effect_case(range, kind, number);
@@ -99,12 +98,5 @@ int main(int count, char** values) {
     }
     progress.finish();
     std::printf("%s: scenario %zu\n", out.c_str(), hidden.scenario);
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  });
 }

@@ -4,8 +4,6 @@
 // Exit status 0: done; 1: the run failed on the way; 2: an argument is wrong.
 
 #include <cstdio>
-#include <exception>
-#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +11,7 @@
 #include <decant/io/progress.hpp>
 
 #include "support/junction_twin.hpp"
+#include "support/tool.hpp"
 
 int main(int count, char** values) {
   example::JunctionTwin twin;
@@ -40,19 +39,12 @@ int main(int count, char** values) {
   twin.spacing = 1e-3 * spacing_mm;
   twin.hidden_physics = !plain;
   twin.noisy_masks = twin.noisy_poses = !clean;
-  try {
+  return example::run_recorder([&] {
     decant::Progress progress("recording", 1);
     example::record_junction(twin, out, [&](double share) { progress.update(share); });
     progress.finish();
     std::printf("%s: left leg %.0f %% open, right leg %.0f %%%s; hidden: %s\n", out.c_str(), 100 * twin.left_opening,
                 100 * twin.right_opening, twin.leak > 0 ? ", a leak" : "",
                 example::draw_junction_errors(twin).physics.words().c_str());
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  });
 }

@@ -4,8 +4,6 @@
 // Exit status 0: done; 1: the run failed on the way; 2: an argument is wrong.
 
 #include <cstdio>
-#include <exception>
-#include <stdexcept>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +11,7 @@
 #include <decant/io/progress.hpp>
 
 #include "support/pour_twin.hpp"
+#include "support/tool.hpp"
 
 int main(int count, char** values) {
   example::PourTwin twin;
@@ -51,18 +50,11 @@ int main(int count, char** values) {
     chosen.kinematic_viscosity = thickness->empty() ? chosen.kinematic_viscosity : viscosity;
     chosen.surface_tension = surface_tension;
   }
-  try {
+  return example::run_recorder([&] {
     decant::Progress progress("recording", 1);
     example::record_pour(twin, out, [&](double share) { progress.update(share); });
     progress.finish();
     std::printf("%s: %s, %.0f %% full; hidden: %s\n", out.c_str(), twin.container.c_str(), 100 * twin.fill_fraction,
                 example::draw_hidden_physics(twin).words().c_str());
-    return 0;
-  } catch (const std::invalid_argument& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  });
 }

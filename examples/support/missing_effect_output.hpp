@@ -83,12 +83,21 @@ inline std::string effect_words(const Effects& effects, const decant::RefinedEff
   return effect.words() + " " + components_text(found.strength) + (effect.unit.empty() ? "" : " " + effect.unit);
 }
 
-/// The effect's line of C++ with its strengths.
+/// The effect's C++ with its strengths and place.
 inline std::string effect_code(const Effects& effects, const decant::RefinedEffect& found) {
+  const decant::Effect& effect = effects.at(found.effect);
   std::string code;
   Eigen::Index k = 0;
-  for (const char c : effects.at(found.effect).code) {
-    code += c == '@' && k < found.strength.size() ? three_digits(found.strength[k++]) : std::string(1, c);
+  for (const char c : effect.code) {
+    if (c == '@') {
+      code += three_digits(found.strength[k++ % found.strength.size()]);
+    } else if (c == '#') {
+      const decant::Vector3<double> place =
+          found.place.value_or(effect.place.value_or(decant::Vector3<double>::Zero()));
+      code += components_text(place);
+    } else {
+      code += c;
+    }
   }
   return code;
 }

@@ -183,13 +183,15 @@ inline std::vector<double> times_from_start(const decant::Recording& recording, 
 
 /// Overlays of each film, drawn and packed.
 struct Overlays {
-  std::vector<std::size_t> frames{};  ///< those that are drawn
+  std::vector<std::size_t> frames{};  ///< those that are drawn, by their place among the sources' overlays
   std::vector<decant::HtmlReport::Film> films{};
 };
 
 /// @param byte_limit of all pictures as text; where every frame would take more, only every second, third ... is kept.
+/// @param recorded the recording's frame of each overlay; empty where it is every frame from the first one on.
 inline Overlays draw_overlays(const decant::Recording& recording, decant::Threads threads,
-                              const std::vector<FilmSource>& sources, std::size_t byte_limit) {
+                              const std::vector<FilmSource>& sources, std::size_t byte_limit,
+                              std::vector<std::size_t> recorded = {}) {
   Overlays out;
   std::size_t count = 0;
   for (const FilmSource& source : sources) {
@@ -201,17 +203,18 @@ inline Overlays draw_overlays(const decant::Recording& recording, decant::Thread
   if (count == 0) {
     return out;
   }
+  recorded = recorded.empty() ? out.frames : std::move(recorded);
   const Region region = region_of_liquid(sources, recording.height, recording.width);
-  const auto bodies = draw_bodies(recording, out.frames, region, threads);
-  const std::vector<double> times = times_from_start(recording, count);
+  const auto bodies = draw_bodies(recording, recorded, region, threads);
   std::size_t bytes = 0;
   for (const FilmSource& source : sources) {
     decant::HtmlReport::Film film{source.name, {}};
     for (std::size_t frame = 0; frame < count; ++frame) {
       // what stopped early leaves the bodies alone
       const Overlay overlay = frame < source.overlays->size() ? (*source.overlays)[frame] : Overlay();
-      film.frames.push_back({times[frame], decant::png_bytes(overlay_picture(bodies[frame], overlay, region)),
-                             "frame " + std::to_string(frame) + " \u00b7 " + source.note(frame)});
+      const double time = recording.timestamps[recorded[frame]] - recording.timestamps.front();
+      film.frames.push_back({time, decant::png_bytes(overlay_picture(bodies[frame], overlay, region)),
+                             "frame " + std::to_string(recorded[frame]) + " \u00b7 " + source.note(frame)});
       bytes += (film.frames.back().png.size() + 2) / 3 * 4;
     }
     out.films.push_back(std::move(film));

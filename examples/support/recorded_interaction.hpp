@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -14,12 +16,16 @@
 #include <utility>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include <decant/boundary/cavity.hpp>
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/discovery/liquid_effects.hpp>
+#include <decant/discovery/missing_effect.hpp>
 #include <decant/discovery/silhouette_series.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
+#include <decant/io/detail/text.hpp>
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/simulator.hpp>
 
@@ -35,14 +41,39 @@ struct InteractionOptions {
   decant::SimulatedInteractionSettings model{};
 };
 
-/// A recording, ready to be explained.
-struct RecordedInteraction {
-  decant::Recording recording;
-  RecordedModel model;
-  std::vector<decant::SilhouetteSeries> seen;  ///< by camera
-};
-
 namespace detail {
+
+/// All of a recording that a model's predictions depend on, as a short text: everything but its name, its images and
+/// its truth. Recordings that differ in nothing else share their model's runs. A 64-bit hash of the files (FNV-1a).
+inline std::string fingerprint(const decant::Recording& recording) {
+  std::uint64_t hash = 14695981039346656037U;
+  const auto add = [&](const std::string& bytes) {
+    for (const char byte : bytes) {
+      hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211U;
+    }
+  };
+  const auto text = [&](const std::filesystem::path& file) {
+    return decant::detail::read_text_file(recording.folder / file, std::uintmax_t{1} << 30);
+  };
+  nlohmann::json description = nlohmann::json::parse(text("recording.json"));
+  for (const char* key : {"name", "truth", "measurements"}) {
+    description.erase(key);
+  }
+  add(description.dump());
+  for (const char* file : {"scene_gt.json", "scene_camera.json"}) {
+    if (std::filesystem::exists(recording.folder / file)) {
+      add(text(file));
+    }
+  }
+  for (const decant::recording::Body& body : recording.bodies) {
+    add(text(body.mesh_file));
+  }
+  std::string digits(16, '0');
+  for (std::size_t k = 0; k < digits.size(); ++k) {
+    digits[k] = "0123456789abcdef"[(hash >> (60 - 4 * k)) & 15U];
+  }
+  return digits;
+}
 
 /// Numbers of the frames that are compared: the first one, and then whichever is next after the time between two.
 inline std::vector<std::size_t> compared_frames(const decant::Recording& recording, double frames_per_second) {
@@ -56,12 +87,14 @@ inline std::vector<std::size_t> compared_frames(const decant::Recording& recordi
   return frames;
 }
 
-/// Masks in cells, cleaned. Frames without a mask, and empty ones between others, are faults of the camera.
-inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std::size_t camera,
-                                        const std::vector<std::size_t>& frames, int cell_px) {
+/// Masks of a camera, cleaned, by frame. Frames without a mask, and empty ones between others, are faults of the
+/// camera: there is nothing of them.
+inline std::vector<std::optional<decant::Mask>> believed_masks(const decant::Recording& recording, std::size_t camera,
+                                                               const std::vector<std::size_t>& frames) {
   using namespace decant;
   const TrackerSettings tracker;
   MaskCleaning cleaning(tracker.cleaning_window_px, tracker.smallest_region_px);
+  const auto has_liquid = [](const Mask& mask) { return (mask.array() >= 128).any(); };
   std::vector<std::optional<Mask>> masks;
   std::size_t first = frames.size(), last = 0;
   for (std::size_t k = 0; k < frames.size(); ++k) {
@@ -70,17 +103,28 @@ inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std:
       Mask cleaned(recording.height, recording.width);
       cleaning.apply(*masks.back(), cleaned);
       masks.back() = std::move(cleaned);
-      if ((masks.back()->array() >= 128).any()) {
+      if (has_liquid(*masks.back())) {
         first = std::min(first, k);
         last = k;
       }
     }
   }
-  SilhouetteSeries series(recording.width, recording.height, cell_px);
+  for (std::size_t k = first; k < last; ++k) {
+    if (masks[k] && !has_liquid(*masks[k])) {
+      masks[k].reset();
+    }
+  }
+  return masks;
+}
+
+/// What a camera saw, in cells.
+inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std::size_t camera,
+                                        const std::vector<std::size_t>& frames, int cell_px) {
+  decant::SilhouetteSeries series(recording.width, recording.height, cell_px);
+  const auto masks = believed_masks(recording, camera, frames);
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const double time = recording.timestamps[frames[k]];
-    const bool blank = masks[k] && first <= k && k <= last && !(masks[k]->array() >= 128).any();
-    if (masks[k] && !blank) {
+    if (masks[k]) {
       series.add(time, *masks[k]);
     } else {
       series.add_unseen(time);
@@ -198,6 +242,19 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
 
 }  // namespace detail
 
+/// A recording, ready to be explained.
+struct RecordedInteraction {
+  decant::Recording recording;
+  RecordedModel model;
+  std::vector<std::size_t> frames;             ///< of the recording, that are compared
+  std::vector<decant::SilhouetteSeries> seen;  ///< by camera
+
+  /// @param name by which messages and journals know it.
+  decant::Interaction<RecordedModel> interaction(std::string name) const {
+    return {std::move(name), &model, seen, detail::fingerprint(recording)};
+  }
+};
+
 /// Throws std::invalid_argument and std::runtime_error for recordings without cameras or with an amount that is not
 /// known.
 inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
@@ -205,7 +262,7 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
   if (recording.cameras.empty()) {
     throw std::runtime_error(recording.name + ": no camera: expected masks to compare a model with");
   }
-  const std::vector<std::size_t> frames = detail::compared_frames(recording, options.frames_per_second);
+  std::vector<std::size_t> frames = detail::compared_frames(recording, options.frames_per_second);
   InteractionScene<EffectModel, DistortedPinholeCamera> scene;
   for (const std::size_t frame : frames) {
     scene.times.push_back(recording.timestamps[frame]);
@@ -236,7 +293,7 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     return model_of<EffectParts<float>>(*start_of, tracking);
   };
   RecordedModel model(std::move(scene), detail::catalogue_of(recording), options.model);
-  return {std::move(recording), std::move(model), std::move(seen)};
+  return {std::move(recording), std::move(model), std::move(frames), std::move(seen)};
 }
 
 }  // namespace example

@@ -37,6 +37,21 @@ inline int run_tool(CLI::App& app, int count, char** values, const std::function
   }
 }
 
+/// Does a recorder's work, of which the command line has been read. @return its exit status: 0; 2 where an argument is
+/// refused, 1 where the run failed on the way, said in one line.
+inline int run_recorder(const std::function<void()>& work) {
+  try {
+    work();
+    return 0;
+  } catch (const std::invalid_argument& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}
+
 /// Throws std::runtime_error unless each file that is asked for, by a name that is not empty, can be written.
 inline void expect_writable(std::initializer_list<std::string> files) {
   for (const std::string& file : files) {

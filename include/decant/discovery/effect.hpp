@@ -46,7 +46,8 @@ struct Effect {
   std::string where{};                     ///< the place in words, "floor of the cup"; empty if it has none
   std::optional<Vector3<double>> place{};  ///< where it acts [m], in the model's own frame for it
   double place_tolerance = 0;              ///< how far from there it may be as well [m]; 0: no other place is tried
-  std::string code{};  ///< the line of C++ that adds it to a simulator, with @ for each component's strength
+  std::string code{};  ///< C++ that adds it to a simulator: @ stands for the strength, one after another of its
+                       ///< components, and # for the place; empty where there is none
 
   /// The family, or the name where there is none.
   const std::string& answer() const noexcept { return family.empty() ? name : family; }

@@ -4,7 +4,6 @@
 /// What an effect of any strength would change, from simulations with a few strengths.
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <set>
@@ -59,7 +58,7 @@ class EffectCurve {
     Eigen::MatrixXd at(static_cast<Eigen::Index>(used.size()), differences.cols());
     Eigen::MatrixXd standardised(differences.rows(), differences.cols());
     for (Eigen::Index k = 0; k < differences.cols(); ++k) {
-      const Eigen::VectorXd phi = terms(strengths[static_cast<std::size_t>(k)]);
+      const Eigen::VectorXd phi = detail::strength_terms(axes_, strengths[static_cast<std::size_t>(k)]);
       at.col(k) = phi(used);
       standardised.col(k) = space.standardised_difference(differences.col(k));
     }
@@ -81,7 +80,7 @@ class EffectCurve {
   }
 
   /// What the effect changes, in standardised features.
-  Eigen::VectorXd at(const Strength& strength) const { return coefficient_ * terms(strength); }
+  Eigen::VectorXd at(const Strength& strength) const { return coefficient_ * detail::strength_terms(axes_, strength); }
 
   /// By component, from the base to the largest strengths that were simulated.
   const std::vector<StrengthAxis>& axes() const noexcept { return axes_; }
@@ -113,16 +112,6 @@ class EffectCurve {
     expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", of.base);
     axes_[component] = {{of.base, std::max(range.second - of.base, of.base - range.first), of.saturating}, range};
     return distinct.size();
-  }
-
-  Eigen::VectorXd terms(const Strength& strength) const {
-    Eigen::VectorXd phi(static_cast<Eigen::Index>(2 * axes_.size()));
-    for (std::size_t k = 0; k < axes_.size(); ++k) {
-      const std::array<double, 2> law = axes_[k].law(strength[static_cast<Eigen::Index>(k)]);
-      phi[static_cast<Eigen::Index>(2 * k)] = law[0];
-      phi[static_cast<Eigen::Index>(2 * k + 1)] = law[1];
-    }
-    return phi;
   }
 
   const NuisanceSpace* space_;

@@ -3,9 +3,10 @@
 
 /// Runs of a forward model that tell what each effect would change, and what differs anyway.
 
+#include <array>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <string>
 #include <utility>
 #include <vector>
@@ -96,9 +97,8 @@ inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effect
 /// What a run depends on beside its model, as text: for journals.
 inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& run) {
   const auto text = [](double value) {
-    char buffer[40];
-    std::snprintf(buffer, sizeof buffer, "%.17g", value);
-    return std::string(buffer);
+    std::array<char, 40> digits{};  // as many as tell one number from the next, whatever the locale
+    return std::string(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
   };
   std::string key = "seed " + std::to_string(run.seed) + (run.tolerated ? " tolerated" : "");
   for (const AppliedEffect& applied : run.effects) {

@@ -54,8 +54,7 @@ class RecordedEvidence {
  public:
   using Series = std::vector<SilhouetteSeries>;
 
-  /// @param recording by camera. @param dictionary has to outlive it. @param references features of recordings without
-  /// hidden effects are not known here yet: see NuisanceSample.
+  /// @param recording by camera. @param dictionary has to outlive it.
   /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras or frames are others.
   RecordedEvidence(Series recording, const EffectDictionary& dictionary, const RecordedEvidenceSettings& settings = {})
       : recording_(std::move(recording)),
@@ -67,6 +66,7 @@ class RecordedEvidence {
     expects(!baselines.empty(), "RecordedEvidence: baselines that worked", "at least one", "none");
     expects(draws_.size() >= 5, "RecordedEvidence: draws that worked", "at least 5", draws_.size());
     expects(features_.size() > 0, "RecordedEvidence: liquid in the recording or in runs", "some", "none");
+    own_ = features_.of(recording_);
     for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
       if (dictionary.worked(run)) {
         of_run_[run] = features_.of(dictionary.seen[run]);
@@ -94,12 +94,12 @@ class RecordedEvidence {
   std::size_t draws() const noexcept { return draws_.size(); }
 
   /// How far the recording is off what is expected, by feature, in standard deviations.
-  Eigen::VectorXd standardised() const { return space_->standardised(features_.of(recording_)); }
-  Eigen::VectorXd recorded_features() const { return features_.of(recording_); }
+  Eigen::VectorXd standardised() const { return space_->standardised(own_); }
+  const Eigen::VectorXd& recorded_features() const noexcept { return own_; }
   const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
 
   /// What the recording says.
-  EffectEvidence of_recording() const { return evidence(recording_, features_.of(recording_), *space_); }
+  EffectEvidence of_recording() const { return evidence(recording_, own_, *space_); }
 
   /// What one of the draws would say as the recording, to a dictionary that does not have it.
   EffectEvidence of_draw(std::size_t draw) const {
@@ -227,6 +227,7 @@ class RecordedEvidence {
   RecordedEvidenceSettings settings_;
   SilhouetteFeatures features_;
   std::vector<std::size_t> draws_{};
+  Eigen::VectorXd own_{};  ///< features of the recording
   std::map<std::size_t, Eigen::VectorXd> of_run_{};
   NuisanceSample sample_{};
   std::unique_ptr<NuisanceSpace> space_{};

@@ -129,7 +129,8 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) 
           "shear_thinning", "viscosity", "m^2/s",
           "the liquid is thick at rest and the thinner the faster it is sheared (its strength is that at rest)",
           {"", kinematic_viscosity, kinematic_viscosity, std::max(4 * thick, 10 * kinematic_viscosity), 0, true},
-          "simulator.force<ShearThinningViscosity<float>>() = {@, 1e-6, 0.1, 0.4};"),
+          "auto& friction = simulator.force<ShearThinningViscosity<float>>(); friction.kinematic_viscosity = @; "
+          "friction.high_shear_viscosity = assumed; friction.relaxation_time = 0.1F; friction.exponent = 0.4F;"),
       [kinematic_viscosity](auto& force, double s) {
         force.kinematic_viscosity = static_cast<Scalar>(s);
         force.high_shear_viscosity = static_cast<Scalar>(kinematic_viscosity);
@@ -168,9 +169,9 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) 
 template <class Model>
 InteractionEffect<Model> suction_effect(const Vector3<double>& place, std::string where) {
   using Scalar = typename Model::Scalar;
-  Effect effect = detail::plain_effect("suction", "", "m/s^2",
-                                       "something draws the liquid toward a point (its strength is that at 5 cm)",
-                                       {"", 0, 0, 12}, "simulator.force<Suction<float>>().strength = @;");
+  Effect effect = detail::plain_effect(
+      "suction", "", "m/s^2", "something draws the liquid toward a point (its strength is that at 5 cm)",
+      {"", 0, 0, 12}, "auto& suction = simulator.force<Suction<float>>(); suction.strength = @; suction.point = {#};");
   effect.place = place;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
@@ -198,7 +199,7 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
                                      std::string where) {
   Effect effect =
       detail::plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
-                           "simulator.add_outlet({container, place, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
+                           "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
   effect.where = std::move(where);
   return detail::run_effect<Model>(
@@ -222,7 +223,7 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
 template <class Model>
 InteractionEffect<Model> loss_effect(BodyId body, const Vector3<double>& place, double radius, std::string where) {
   Effect effect = detail::plain_effect("loss", "", "ml/s", "liquid disappears little by little", {"", 0, 0, 40},
-                                       "simulator.add_outlet({container, middle, radius, {{0, 1e-6 * @}, {60, 1e-6 * "
+                                       "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * "
                                        "@}}, OutletOrder::Evenly});");
   effect.place = place;
   effect.where = std::move(where);
@@ -244,7 +245,7 @@ template <class Model>
 InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin origin, std::string where) {
   Effect effect =
       detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
-                           "simulator.add_inlet({place, down, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
+                           "simulator.add_inlet({{#}, down, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
   effect.place = place;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
@@ -284,7 +285,7 @@ std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std:
   std::vector<InteractionEffect<Model>> effects;
   effects.push_back(run_effect<Model>(
       plain_effect("latency", "", "s", "poses were recorded too late (too early, where negative)",
-                   {"", 0, -0.12, 0.12, 0.008}, "recording.pose_delay = @;"),
+                   {"", 0, -0.12, 0.12, 0.008}, ""),
       EffectKind::Measurement,
       [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.pose_delay = s[0]; }));
   for (std::size_t body = 0; body < bodies.size(); ++body) {
@@ -298,20 +299,20 @@ std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std:
                                           changes.body_offset.at(body) = s.head<3>();
                                         }));
   }
-  Effect shift = plain_effect("camera_shift", "", "px", "the camera has moved, which shifts its picture",
-                              {"u", 0, -4, 4, 1}, "camera_from_world = turn(@, @) * camera_from_world;");
+  Effect shift =
+      plain_effect("camera_shift", "", "px", "the camera has moved, which shifts its picture", {"u", 0, -4, 4, 1}, "");
   shift.components.push_back({"v", 0, -4, 4, 1});
   effects.push_back(run_effect<Model>(
       shift, EffectKind::Nuisance,
       [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.camera_shift = s.head<2>(); }));
   effects.push_back(run_effect<Model>(
       plain_effect("camera_roll", "camera_shift", "rad", "the camera has turned about its axis",
-                   {"", 0, -0.02, 0.02, 0.005}, "camera_from_world = roll(@) * camera_from_world;"),
+                   {"", 0, -0.02, 0.02, 0.005}, ""),
       EffectKind::Nuisance,
       [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.camera_roll = s[0]; }));
   effects.push_back(run_effect<Model>(
       plain_effect("mask_bias", "", "px", "masks are fatter than the liquid (thinner, where negative)",
-                   {"", 0, -2, 2, 0.7}, "settings.sphere_in_spacings += @ * metres_per_pixel / spacing;"),
+                   {"", 0, -2, 2, 0.7}, ""),
       EffectKind::Nuisance,
       [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.mask_growth = s[0]; }));
   return effects;

@@ -41,6 +41,8 @@ struct Interaction {
   std::string name{};
   const Model* model = nullptr;               ///< has to outlive the workflow
   std::vector<SilhouetteSeries> recording{};  ///< by camera
+  std::string
+      of_model{};  ///< all that the model's predictions depend on, for RunJobs' keys; the name where it is empty
 };
 
 /// Runs jobs: work(k) for each key, results in the order of the keys. A key says all that a result depends on beside
@@ -157,7 +159,7 @@ class MissingEffectSearch {
     MissingEffect result;
     bool explained = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
-      const Knowledge known = know(learn_, applied(result.found));
+      const Knowledge known = know(learn_, effects(), applied(result.found));
       const Judgement judgement = judge_effects(effects(), known.evidence, known.chance, settings_.judgement);
       if (round == 0) {
         result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.improvement};
@@ -238,7 +240,9 @@ class MissingEffectSearch {
     std::vector<std::size_t> job_of, first;  // equal runs are made once
     std::map<std::string, std::size_t> number;
     for (std::size_t k = 0; k < runs.size(); ++k) {
-      std::string key = runs[k].first->name + ": " + run_key(effects(), runs[k].second);
+      const Interaction<Model>& of = *runs[k].first;
+      std::string key = of.of_model.empty() ? of.name : of.of_model;
+      key += ": " + run_key(effects(), runs[k].second);
       const auto [place, is_new] = number.try_emplace(key, keys.size());
       if (is_new) {
         keys.push_back(std::move(key));
@@ -280,8 +284,10 @@ class MissingEffectSearch {
     return seen;
   }
 
-  Knowledge know(const std::vector<Interaction<Model>>& of, const std::vector<AppliedEffect>& added) {
-    const std::vector<PlannedRun> plan = plan_dictionary(effects(), settings_.dictionary, added);
+  /// @param effects of which there are runs; none where only the gap is asked about.
+  Knowledge know(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
+                 const std::vector<AppliedEffect>& added) {
+    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings_.dictionary, added);
     std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
     for (const Interaction<Model>& each : of) {
       for (const PlannedRun& planned : plan) {
@@ -292,7 +298,7 @@ class MissingEffectSearch {
     Knowledge known;
     for (std::size_t k = 0; k < of.size(); ++k) {
       const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
-      known.dictionary.push_back({effects(), plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
+      known.dictionary.push_back({effects, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
     }
     std::vector<std::vector<EffectEvidence>> draws;
     for (std::size_t k = 0; k < of.size(); ++k) {  // dictionaries are not moved from here on
@@ -541,37 +547,14 @@ class MissingEffectSearch {
 
   /// Predicts recordings that were not used, with what was found and with its rivals, strengths as they were found.
   void check(MissingEffect& result) {
-    const std::vector<PlannedRun> plan = plan_dictionary({}, settings_.dictionary);
-    std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
-    for (const Interaction<Model>& each : held_out_) {
-      for (const PlannedRun& planned : plan) {
-        runs.emplace_back(&each, planned.run);
-      }
+    const Knowledge known = know(held_out_, {}, {});
+    GapChange& gap = result.held_out;
+    gap.before = 0;
+    for (const EffectEvidence& each : known.evidence) {
+      gap.before += each.distance / static_cast<double>(held_out_.size());
     }
-    const std::vector<Series> seen = predictions(runs);
-    std::vector<EffectDictionary> dictionaries;
-    for (std::size_t k = 0; k < held_out_.size(); ++k) {
-      const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
-      dictionaries.push_back({{}, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
-    }
-    std::vector<RecordedEvidence> recorded;
-    std::vector<double> distance_of_draw(static_cast<std::size_t>(settings_.dictionary.draws), 0);
-    const auto count = static_cast<double>(held_out_.size());
-    result.held_out.before = 0;
-    for (std::size_t k = 0; k < held_out_.size(); ++k) {
-      recorded.emplace_back(held_out_[k].recording, dictionaries[k], settings_.evidence);
-      result.held_out.before += recorded[k].of_recording().distance / count;
-      for (std::size_t draw = 0; draw < recorded[k].draws(); ++draw) {
-        distance_of_draw[draw] += recorded[k].of_draw(draw).distance / count;
-      }
-    }
-    double mean = 0, largest = 0;
-    for (const double each : distance_of_draw) {
-      mean += each / static_cast<double>(distance_of_draw.size());
-      largest = std::max(largest, each);
-    }
-    result.held_out.noise = mean;
-    result.held_out.by_chance = result.learn.by_chance;
+    gap.noise = known.chance.distance;
+    gap.by_chance = result.learn.by_chance;
     const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
     std::vector<std::vector<AppliedEffect>> sets{applied(result.found)};
     for (const RefinedEffect& rival : result.refined) {
@@ -579,7 +562,7 @@ class MissingEffectSearch {
         sets.push_back({rival.applied()});
       }
     }
-    runs.clear();
+    std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
     for (const auto& set : sets) {
       for (const Interaction<Model>& of : held_out_) {
         for (std::size_t k = 0; k < seeds; ++k) {
@@ -587,13 +570,12 @@ class MissingEffectSearch {
         }
       }
     }
-    const std::vector<double> after = left(runs, seeds, recorded);
-    GapChange& gap = result.held_out;
+    const std::vector<double> after = left(runs, seeds, known.recorded);
     gap.after = after.front();
     if (after.size() > 1) {
       gap.best_rival = *std::min_element(after.begin() + 1, after.end());
     }
-    if (gap.before < settings_.judgement.distance_factor * largest) {
+    if (gap.before < known.chance.largest_distance) {
       result.confirmation = Confirmation::NotTestable;
     } else {
       const bool shrinks = gap.after <= gap.before - gap.by_chance;

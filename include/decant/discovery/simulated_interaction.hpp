@@ -177,30 +177,43 @@ class SimulatedInteraction {
   }
 
   std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    std::vector<SilhouetteSeries> seen;
+    for (const auto& camera : scene_.cameras) {
+      seen.emplace_back(camera.camera.width(), camera.camera.height(), settings_.cell_px);
+    }
+    const bool ended = watch(run, [&](std::size_t frame, Model&, std::span<const Mask> masks) {
+      for (std::size_t camera = 0; camera < masks.size(); ++camera) {
+        seen[camera].add(scene_.times[frame], masks[camera]);
+      }
+    });
+    return ended ? seen : std::vector<SilhouetteSeries>();
+  }
+
+  /// Runs, and calls frame_is_there(frame, model, masks by camera) for each frame that is compared.
+  /// @return whether the simulation came to its end.
+  template <class FrameIsThere>
+  bool watch(const ModelRun& run, FrameIsThere&& frame_is_there) const {
     const auto [changes, spacing] = this->changes(run);
     Model model = started(changes, spacing * settings_.spacing, run.seed);
     std::vector<Eye> eyes;
     for (const auto& camera : scene_.cameras) {
       eyes.push_back(eye(camera, changes, model));
     }
+    std::vector<Mask> masks(eyes.size());
     const double start = model.time() - scene_.times.front();
     for (std::size_t frame = 0; frame < scene_.times.size(); ++frame) {
       const double until = start + scene_.times[frame];
       while (model.time() < until - 1e-9) {
         if (!model.step(std::min(settings_.longest_step, until - model.time())).advanced()) {
-          return {};
+          return false;
         }
       }
       for (std::size_t k = 0; k < eyes.size(); ++k) {
-        eyes[k].picture.predict(model, 0, eyes[k].turn * scene_.cameras[k].camera_from_world[frame], eyes[k].mask);
-        eyes[k].seen.add(scene_.times[frame], eyes[k].mask);
+        eyes[k].picture.predict(model, 0, eyes[k].turn * scene_.cameras[k].camera_from_world[frame], masks[k]);
       }
+      frame_is_there(frame, model, std::span<const Mask>(masks));
     }
-    std::vector<SilhouetteSeries> seen;
-    for (Eye& each : eyes) {
-      seen.push_back(std::move(each.seen));
-    }
-    return seen;
+    return true;
   }
 
  private:
@@ -210,8 +223,6 @@ class SimulatedInteraction {
   struct Eye {
     Picture picture;
     Pose turn;
-    Mask mask;
-    SilhouetteSeries seen;
   };
 
   Eye eye(const InteractionCamera<CameraType>& camera, const Changes& changes, const Model& model) const {
@@ -223,10 +234,7 @@ class SimulatedInteraction {
     const Eigen::Quaterniond turn = Eigen::AngleAxisd(changes.camera_roll, Eigen::Vector3d::UnitZ()) *
                                     Eigen::AngleAxisd(angle.x(), Eigen::Vector3d::UnitY()) *
                                     Eigen::AngleAxisd(-angle.y(), Eigen::Vector3d::UnitX());
-    Eye result{Picture(model, {}, drawing),
-               {turn, Vector3<double>::Zero()},
-               Mask(),
-               SilhouetteSeries(camera.camera.width(), camera.camera.height(), settings_.cell_px)};
+    Eye result{Picture(model, {}, drawing), {turn, Vector3<double>::Zero()}};
     result.picture.add_camera(camera.camera, camera.camera_from_world.front());
     return result;
   }

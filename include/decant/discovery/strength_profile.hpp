@@ -40,6 +40,21 @@ struct StrengthAxis {
   bool operator==(const StrengthAxis&) const = default;
 };
 
+namespace detail {
+
+/// The laws of all components, one after another.
+inline Eigen::VectorXd strength_terms(const std::vector<StrengthAxis>& axes, const Eigen::VectorXd& strength) {
+  Eigen::VectorXd phi(static_cast<Eigen::Index>(2 * axes.size()));
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::array<double, 2> law = axes[k].law(strength[static_cast<Eigen::Index>(k)]);
+    phi[static_cast<Eigen::Index>(2 * k)] = law[0];
+    phi[static_cast<Eigen::Index>(2 * k + 1)] = law[1];
+  }
+  return phi;
+}
+
+}  // namespace detail
+
 /// Distances d(s) = d_0 - 2 b . phi(s) + phi(s)' G phi(s), phi being the laws of all components one after another.
 /// Those of several pours with one strength add up.
 class StrengthProfile {
@@ -65,7 +80,7 @@ class StrengthProfile {
   const StrengthAxis& axis(std::size_t component) const { return axes_.at(component); }
 
   double operator()(const Strength& strength) const {
-    const Eigen::VectorXd phi = terms(strength);
+    const Eigen::VectorXd phi = detail::strength_terms(axes_, strength);
     return without_ - 2 * answer_.dot(phi) + phi.dot(square_ * phi);
   }
 
@@ -113,16 +128,6 @@ class StrengthProfile {
 
  private:
   static constexpr int fine_steps = 50;
-
-  Eigen::VectorXd terms(const Strength& strength) const {
-    Eigen::VectorXd phi(static_cast<Eigen::Index>(2 * axes_.size()));
-    for (std::size_t k = 0; k < axes_.size(); ++k) {
-      const std::array<double, 2> law = axes_[k].law(strength[static_cast<Eigen::Index>(k)]);
-      phi[static_cast<Eigen::Index>(2 * k)] = law[0];
-      phi[static_cast<Eigen::Index>(2 * k + 1)] = law[1];
-    }
-    return phi;
-  }
 
   /// The smallest distance where one component has a value; of all, where there is no such component. Looks on a grid,
   /// then around the best of it in smaller and smaller steps: distances are smooth, but may have several valleys.

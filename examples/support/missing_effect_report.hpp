@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What the workflow for missing effects found, as a page for a browser: the recording against the model as it is and
+/// against the mended one.
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/core/parallel.hpp>
+#include <decant/discovery/missing_effect.hpp>
+#include <decant/io/report.hpp>
+#include <decant/io/table.hpp>
+#include <decant/tracking/overlap.hpp>
+#include <decant/tracking/overlap_score.hpp>
+
+#include "missing_effect_output.hpp"
+#include "overlay_pictures.hpp"
+#include "recorded_interaction.hpp"
+
+namespace example {
+
+/// A run of a recording's model beside what its first camera saw.
+struct ModelView {
+  decant::OverlapScore overlap{};
+  std::vector<double> iou{};                  ///< by frame that is compared; NaN where nothing was seen
+  std::vector<std::vector<double>> volume{};  ///< by body and frame [ml]; empty for bodies that hold nothing
+  std::vector<Overlay> overlays{};            ///< by frame
+};
+
+inline ModelView view_of_run(const RecordedInteraction& of, const decant::ModelRun& run) {
+  ModelView view;
+  view.volume.resize(of.recording.bodies.size());
+  const auto seen = detail::believed_masks(of.recording, 0, of.frames);
+  of.model.watch(run, [&](std::size_t frame, EffectModel& model, std::span<const decant::Mask> predicted) {
+    const decant::Mask* mask = seen[frame] ? &*seen[frame] : nullptr;
+    const decant::Overlap overlap =
+        mask != nullptr ? decant::overlap(predicted.front(), *mask) : decant::Overlap();  // of nothing
+    view.overlap.add(overlap);
+    view.iou.push_back(overlap.iou());
+    Overlay overlay = overlay_of(predicted.front(), mask);
+    overlay.counts = mask != nullptr && overlap.union_px() >= decant::OverlapScoreSettings{}.least_union_px;
+    view.overlays.push_back(std::move(overlay));
+    for (const auto& contained : model.step(0).contents) {
+      view.volume[contained.body].push_back(1e6 * contained.volume);
+    }
+  });
+  return view;
+}
+
+namespace detail {
+
+/// A model to be compared with recordings, and how it does with each.
+struct ComparedModel {
+  std::string name;
+  std::vector<decant::AppliedEffect> effects{};
+  std::vector<ModelView> views{};  ///< by recording
+};
+
+/// The model as it is, and with what was found or, where nothing explains the gap, with what comes nearest.
+inline std::vector<ComparedModel> compared_models(const Effects& effects, const decant::MissingEffect& result) {
+  std::vector<ComparedModel> models{{"the model as it is"}};
+  std::vector<decant::RefinedEffect> added = result.found;
+  if (added.empty() && !result.refined.empty()) {
+    added.push_back(result.refined.front());
+  }
+  if (!added.empty()) {
+    ComparedModel& with = models.emplace_back();
+    for (const decant::RefinedEffect& each : added) {
+      with.name += with.name.empty() ? "with " : " and ";
+      with.name += effect_words(effects, each);
+      with.effects.push_back(each.applied());
+    }
+  }
+  return models;
+}
+
+inline decant::Table overlap_table(const std::vector<ComparedModel>& models,
+                                   const std::vector<const RecordedInteraction*>& interactions) {
+  using decant::detail::fixed_text;
+  decant::Table table({"recording", "model", "IoU, mean over frames", "IoU, pooled", "at the end [ml]"});
+  for (std::size_t k = 0; k < interactions.size(); ++k) {
+    for (const ComparedModel& model : models) {
+      const ModelView& view = model.views[k];
+      std::string contents;
+      for (std::size_t body = 0; body < view.volume.size(); ++body) {
+        if (!view.volume[body].empty()) {
+          contents += contents.empty() ? "" : ", ";
+          contents += interactions[k]->recording.bodies[body].name;
+          contents += ' ';
+          contents += fixed_text(view.volume[body].back(), 0);
+        }
+      }
+      table.add({interactions[k]->recording.name, model.name, fixed_text(view.overlap.mean_over_frames(), 3),
+                 fixed_text(view.overlap.pooled_over_pixels(), 3), contents});
+    }
+  }
+  return table;
+}
+
+inline decant::BarChart candidates_chart(const Effects& effects, const decant::MissingEffect& result) {
+  decant::BarChart chart{"What of the gap each effect explains", "", "of what is reducible [%]", {}, {{"", {}}}, {100}};
+  for (const decant::EffectStanding& each : result.judgement.standings) {
+    if (chart.groups.size() < 8) {
+      const auto refined = std::find_if(result.refined.begin(), result.refined.end(),
+                                        [&](const auto& other) { return other.effect == each.effect; });
+      chart.groups.push_back(effects.at(each.effect).name);
+      chart.bars.front().heights.push_back(
+          100 * std::max(0.0, refined != result.refined.end() ? refined->share : each.share));
+    }
+  }
+  return chart;
+}
+
+/// Films and charts of the first recording.
+inline void add_first_recording(decant::HtmlReport& report, const RecordedInteraction& first,
+                                const std::vector<ComparedModel>& models) {
+  std::vector<double> times;
+  for (const std::size_t frame : first.frames) {
+    times.push_back(first.recording.timestamps[frame] - first.recording.timestamps.front());
+  }
+  std::vector<FilmSource> sources;
+  decant::LineChart overlap{"Overlap with what was seen", "time [s]", "IoU", {}};
+  overlap.y_within = {0, 1};
+  decant::LineChart contents{"Liquid in each body", "time [s]", "ml", {}};
+  for (const ComparedModel& model : models) {
+    const ModelView& view = model.views.front();
+    sources.push_back({model.name, &view.overlays, [&view](std::size_t frame) {
+                         return view.overlays[frame].counts ? "IoU " + figure(view.iou[frame], 3)
+                                                            : std::string("nothing seen, or little");
+                       }});
+    overlap.lines.push_back(
+        {model.name, {times.begin(), times.begin() + static_cast<std::ptrdiff_t>(view.iou.size())}, view.iou});
+    for (std::size_t body = 0; body < view.volume.size(); ++body) {
+      if (!view.volume[body].empty()) {
+        contents.lines.push_back({first.recording.bodies[body].name + ", " + model.name,
+                                  {times.begin(), times.begin() + static_cast<std::ptrdiff_t>(view.iou.size())},
+                                  view.volume[body]});
+      }
+    }
+  }
+  report.heading("Seen and predicted: " + first.recording.name);
+  const Overlays overlays = draw_overlays(first.recording, {1}, sources, 6'500'000, first.frames);
+  if (!overlays.films.empty()) {
+    const std::vector<std::size_t> chosen = telling_pictures(overlays, sources);
+    add_overlays(report, first.recording, "Seen against predicted from the start on, without looking", overlays,
+                 chosen);
+    report.chart(overlap);
+    report.chart(contents);
+    add_chosen_frames(report, overlays, sources, chosen);
+  }
+}
+
+}  // namespace detail
+
+/// @param interactions those that were learnt from, the first one's films are shown, then those held out.
+/// @param learnt how many of them were learnt from.
+inline void write_missing_effect_report(const std::string& file,
+                                        const std::vector<const RecordedInteraction*>& interactions, std::size_t learnt,
+                                        const decant::MissingEffect& result) {
+  const std::vector<decant::Effect>& effects = interactions.front()->model.effects();
+  std::vector<detail::ComparedModel> models = detail::compared_models(effects, result);
+  for (detail::ComparedModel& model : models) {
+    model.views.resize(interactions.size());
+  }
+  const auto runs = static_cast<decant::Index>(models.size() * interactions.size());
+  decant::parallel_jobs(runs, {0}, [&](decant::Index number) {
+    const auto model = static_cast<std::size_t>(number) / interactions.size();
+    const auto which = static_cast<std::size_t>(number) % interactions.size();
+    models[model].views[which] = view_of_run(*interactions[which], {models[model].effects, 1, false});
+  });
+  decant::HtmlReport report("What the model lacks");
+  report.paragraph(missing_effect_sentence(effects, result));
+  for (const decant::RefinedEffect& each : result.found) {
+    const std::string code = detail::effect_code(effects, each);
+    report.paragraph(effects[each.effect].words() + ": " + effects[each.effect].meaning + "." +
+                     (code.empty() ? "" : " In the model: " + code));
+  }
+  report.heading("The gap");
+  report.table(gap_table(result));
+  report.table(detail::overlap_table(models, interactions));
+  if (result.judgement.has_gap()) {
+    report.bar_chart(detail::candidates_chart(effects, result));
+  }
+  detail::add_first_recording(report, *interactions.front(), models);
+  report.heading("Where");
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < learnt; ++k) {
+    names.push_back(interactions[k]->recording.name);
+  }
+  report.table(where_table(names, result));
+  report.heading("Candidates");
+  report.table(candidates_table(effects, result));
+  report.write(file);
+}
+
+}  // namespace example
