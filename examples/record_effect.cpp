@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -17,17 +16,6 @@
 
 #include "support/effect_twin.hpp"
 #include "support/tool.hpp"
-
-namespace {
-
-/// Each effect in each of the range's scenarios; enough of the others to count false alarms by.
-int usual_cases(example::CaseRange range, example::CaseKind kind) {
-  const auto scenarios = static_cast<int>(example::scenarios_of(range).size());
-  const auto effects = static_cast<int>(example::entries_of(kind).size());
-  return kind == example::CaseKind::Nothing ? 4 * scenarios : effects * scenarios;
-}
-
-}  // namespace
 
 int main(int count, char** values) {
   using example::CaseKind;
@@ -45,14 +33,9 @@ int main(int count, char** values) {
   app.failure_message([](const CLI::App*, const CLI::Error& error) { return std::string(error.what()) + "\n"; });
   app.add_option("--out", out, "new folder for the recordings a and b");
   app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, CaseRange>{{"develop", CaseRange::Develop}, {"report", CaseRange::Report}}));
+      ->transform(CLI::CheckedTransformer(example::case_ranges()));
   app.add_option("--kind", kind, "moderate, weak, nothing, outside (what no method is told of) or measurement")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, CaseKind>{{"moderate", CaseKind::Moderate},
-                                                                          {"weak", CaseKind::Weak},
-                                                                          {"nothing", CaseKind::Nothing},
-                                                                          {"outside", CaseKind::Outside},
-                                                                          {"measurement", CaseKind::Measurement}}));
+      ->transform(CLI::CheckedTransformer(example::case_kinds()));
   auto* numbered = app.add_option("--case", number, "number of the case, from 0 on")->check(CLI::Range(0, 1000000));
   app.add_flag("--list", list, "names the cases of a kind and their scenarios, and records nothing");
   auto* nothing = app.add_flag("--nothing", plain, "a reference: nothing is hidden");
@@ -78,7 +61,7 @@ int main(int count, char** values) {
   settings.with_effect = !without;
   return example::run_recorder([&] {
     if (list) {
-      for (int k = 0; k < usual_cases(range, kind); ++k) {
+      for (int k = 0; k < example::usual_cases(range, kind); ++k) {
         const example::EffectCase each = example::effect_case(range, kind, k);
         std::printf("%s %s %d: scenario %zu\n", each.range.c_str(), each.kind.c_str(), k, each.scenario);
       }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <numbers>
 #include <random>
 #include <string>
@@ -259,6 +260,28 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
   }
   hidden.scenario = scenarios[place % scenarios.size()];
   return hidden;
+}
+
+/// How many cases of a kind there are to look at: each effect in each of the range's scenarios, and enough of the
+/// others to count false alarms by.
+inline int usual_cases(CaseRange range, CaseKind kind) {
+  const auto scenarios = static_cast<int>(scenarios_of(range).size());
+  const auto effects = static_cast<int>(entries_of(kind).size());
+  return kind == CaseKind::Nothing ? 4 * scenarios : effects * scenarios;
+}
+
+/// By the words of a command line.
+inline const std::map<std::string, CaseRange>& case_ranges() {
+  static const std::map<std::string, CaseRange> ranges{{"develop", CaseRange::Develop}, {"report", CaseRange::Report}};
+  return ranges;
+}
+inline const std::map<std::string, CaseKind>& case_kinds() {
+  static const std::map<std::string, CaseKind> kinds{{"moderate", CaseKind::Moderate},
+                                                     {"weak", CaseKind::Weak},
+                                                     {"nothing", CaseKind::Nothing},
+                                                     {"outside", CaseKind::Outside},
+                                                     {"measurement", CaseKind::Measurement}};
+  return kinds;
 }
 
 /// A recording in which nothing is hidden, for reference: of any scenario, with a seed of its own kind.

@@ -71,6 +71,9 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
   if (found.place) {
     json["place"] = {found.place->x(), found.place->y(), found.place->z()};
   }
+  if (found.window) {
+    json["window_s"] = {number_json(found.window->from), number_json(found.window->until)};
+  }
   if (effect.name == "lateral_force" && found.strength.norm() > 0) {
     json["direction_w"] = {found.strength[0] / found.strength.norm(), found.strength[1] / found.strength.norm(), 0.0};
   }
@@ -80,14 +83,29 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
 /// In words, such as "viscosity 9e-4 m^2/s".
 inline std::string effect_words(const Effects& effects, const decant::RefinedEffect& found) {
   const decant::Effect& effect = effects.at(found.effect);
-  return effect.words() + " " + components_text(found.strength) + (effect.unit.empty() ? "" : " " + effect.unit);
+  std::string text = effect.words() + " " + components_text(found.strength);
+  text += effect.unit.empty() ? "" : " ";
+  text += effect.unit;
+  if (found.window && std::isfinite(found.window->from)) {
+    text += " from ";
+    text += decant::detail::fixed_text(found.window->from, 2);
+    text += " s on";
+  }
+  if (found.window && std::isfinite(found.window->until)) {
+    text += " until ";
+    text += decant::detail::fixed_text(found.window->until, 2);
+    text += " s";
+  }
+  return text;
 }
 
-/// The effect's C++ with its strengths and place.
+/// The effect's C++ with its strengths, place and times.
 inline std::string effect_code(const Effects& effects, const decant::RefinedEffect& found) {
   const decant::Effect& effect = effects.at(found.effect);
   std::string code;
+  const decant::TimeWindow window = found.window.value_or(effect.window.value_or(decant::TimeWindow{}));
   Eigen::Index k = 0;
+  bool begun = false;
   for (const char c : effect.code) {
     if (c == '@') {
       code += three_digits(found.strength[k++ % found.strength.size()]);
@@ -95,6 +113,9 @@ inline std::string effect_code(const Effects& effects, const decant::RefinedEffe
       const decant::Vector3<double> place =
           found.place.value_or(effect.place.value_or(decant::Vector3<double>::Zero()));
       code += components_text(place);
+    } else if (c == '~') {
+      code += three_digits(begun ? window.until : window.from);
+      begun = true;
     } else {
       code += c;
     }
@@ -184,7 +205,11 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
       }
     }
   }
-  json["onset_s"] = earliest != nullptr ? nlohmann::json(earliest->begin) : nlohmann::json();
+  const decant::RefinedEffect* timed =
+      !result.found.empty() && result.found.front().window ? &result.found.front() : nullptr;
+  json["onset_s"] = timed != nullptr      ? number_json(timed->window->from)
+                    : earliest != nullptr ? nlohmann::json(earliest->begin)
+                                          : nlohmann::json();
   json["onset_px"] = earliest != nullptr ? nlohmann::json({earliest->onset_u, earliest->onset_v}) : nlohmann::json();
   json["gap"] = {{"before", number_json(result.learn.before)},
                  {"after", number_json(result.learn.after)},

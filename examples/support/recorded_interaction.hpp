@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -135,6 +136,7 @@ inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std:
 
 /// Where liquid leaves the source and where it should go: the lip of the most tilted pose, and the target's middle.
 struct PourPlaces {
+  decant::Vector3<double> lip = decant::Vector3<double>::Zero();  ///< in the source's frame [m]
   decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way between the two [m]
   decant::Vector3<double> target = decant::Vector3<double>::Zero();
 };
@@ -171,6 +173,7 @@ inline PourPlaces pour_places(const decant::Recording& recording) {
           if (up.dot(x) < lowest) {
             lowest = up.dot(x);
             lip = x;
+            places.lip = vertex;
           }
         }
       }
@@ -182,6 +185,42 @@ inline PourPlaces pour_places(const decant::Recording& recording) {
   }
   places.jet = source && target ? Vector3<double>(0.5 * (lip + places.target)) : lip;
   return places;
+}
+
+/// A container's inside, in its own frame.
+struct Inside {
+  decant::Vector3<double> up = decant::Vector3<double>::UnitZ();
+  decant::Vector3<double> middle = decant::Vector3<double>::Zero();  ///< of the body's box [m]
+  decant::Vector3<double> floor = decant::Vector3<double>::Zero();   ///< the lowest place inside, below the middle [m]
+  double rim = 0;                                                    ///< height along `up` [m]
+  double rim_area = 0, widest_area = 0;                              ///< of level sections [m^2]
+
+  double rim_radius() const { return std::sqrt(rim_area / std::numbers::pi); }
+  /// Air gets in past the liquid only with difficulty.
+  bool has_neck() const { return rim_area < 0.45 * widest_area; }
+  decant::Vector3<double> mouth() const { return middle + (rim - middle.dot(up)) * up; }
+};
+
+inline std::optional<Inside> inside_of(const decant::recording::Body& body, const decant::Vector3<double>& own_up) {
+  using namespace decant;
+  const Cavity cavity(std::make_shared<const BoundingVolumeHierarchy>(body.mesh), own_up);
+  if (cavity.empty()) {
+    return std::nullopt;
+  }
+  Inside inside;
+  inside.up = own_up;
+  inside.middle = BoundingVolumeHierarchy(body.mesh).bounds().center();
+  inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(own_up)) * own_up;
+  inside.rim = cavity.rim_height();
+  constexpr int slices = 20;
+  const double thick = (inside.rim - cavity.bottom_height()) / slices;
+  for (int k = 0; k < slices && thick > 0; ++k) {
+    const double top = inside.rim - k * thick;
+    const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
+    inside.rim_area = k == 0 ? area : inside.rim_area;
+    inside.widest_area = std::max(inside.widest_area, area);
+  }
+  return inside;
 }
 
 /// The catalogue, as far as it applies to a recording.
@@ -196,34 +235,44 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   effects.push_back(suction_effect<EffectModel>(places.jet - aside * across, "beside the jet, the other side"));
   effects.push_back(suction_effect<EffectModel>(places.jet + aside * along, "beside the jet, behind"));
   effects.push_back(suction_effect<EffectModel>(places.jet - aside * along, "beside the jet, in front"));
+  const double begin = recording.timestamps.front(), seconds = recording.timestamps.back() - begin;
+  std::vector<InteractionEffect<EffectModel>> of_bodies;
   for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
     const recording::Body& body = recording.bodies[k];
     const bool source = body.role == recording::Role::Source;
     if (!source && body.role != recording::Role::Target) {
       continue;
     }
-    // the lowest place inside, and its outside
-    const BoundingVolumeHierarchy surface(body.mesh);
-    const Vector3<double> own_up = body.motion.at(recording.timestamps.front()).rotation.conjugate() * up;
-    const Cavity cavity(std::make_shared<const BoundingVolumeHierarchy>(body.mesh), own_up);
-    if (cavity.empty()) {
+    const Pose first = body.motion.at(begin);
+    const std::optional<Inside> inside = inside_of(body, first.rotation.conjugate() * up);
+    if (!inside) {
       continue;
     }
-    const Vector3<double> middle = surface.bounds().center();
-    const Vector3<double> floor = middle + (cavity.bottom_height() - middle.dot(own_up)) * own_up;
-    double lowest = 0;
+    double lowest = 0;  // of the body's outside below its floor
     for (const auto& vertex : body.mesh.vertices) {
-      lowest = std::min(lowest, own_up.dot(vertex - floor));
+      lowest = std::min(lowest, inside->up.dot(vertex - inside->floor));
     }
     const auto id = static_cast<BodyId>(k);
-    effects.push_back(
-        leak_effect<EffectModel>(id, floor + 0.003 * own_up, (lowest - 0.009) * own_up, "floor of the " + body.name));
-    if (!source) {
-      effects.push_back(
-          loss_effect<EffectModel>(id, middle, 0.5 * surface.bounds().diagonal().norm(), "in the " + body.name));
-      effects.push_back(inflow_effect<EffectModel>(body.motion.at(recording.timestamps.front()) * middle + 0.08 * up,
-                                                   static_cast<Origin>(recording.bodies.size()),
-                                                   "above the " + body.name));
+    effects.push_back(leak_effect<EffectModel>(id, inside->floor + 0.003 * inside->up, (lowest - 0.009) * inside->up,
+                                               "floor of the " + body.name));
+    constexpr double half = 0.01;  // of an obstacle of middling size [m]
+    if (source) {
+      // on the wall below where liquid leaves
+      const Vector3<double> in = (inside->mouth() - places.lip).normalized();
+      of_bodies.push_back(
+          obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + body.name));
+      if (inside->has_neck()) {
+        of_bodies.push_back(back_pressure_effect<EffectModel>(
+            {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, body.name));
+      }
+    } else {
+      effects.push_back(loss_effect<EffectModel>(id, inside->middle,
+                                                 0.5 * BoundingVolumeHierarchy(body.mesh).bounds().diagonal().norm(),
+                                                 "in the " + body.name));
+      effects.push_back(inflow_effect<EffectModel>(
+          first * inside->middle + 0.08 * up, static_cast<Origin>(recording.bodies.size()), "above the " + body.name,
+          TimeWindow{.from = begin + 0.3 * seconds}, 0.3 * seconds));
+      of_bodies.push_back(obstacle_effect<EffectModel>(id, inside->floor + half * inside->up, "in the " + body.name));
     }
   }
   if (recording.liquid.initial) {
@@ -237,6 +286,13 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   for (auto& effect : measurement_effects<EffectModel>(names)) {
     effects.push_back(std::move(effect));
   }
+  for (auto& effect : of_bodies) {
+    effects.push_back(std::move(effect));
+  }
+  effects.push_back(passing_force_effect<EffectModel>({begin + 0.2 * seconds, begin + 0.6 * seconds}, 0.25 * seconds,
+                                                      "for a while, early"));
+  effects.push_back(passing_force_effect<EffectModel>({begin + 0.5 * seconds, begin + 0.95 * seconds}, 0.25 * seconds,
+                                                      "for a while, late"));
   return effects;
 }
 

@@ -82,6 +82,7 @@
 #include <decant/discovery/silhouette_series.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
 #include <decant/discovery/strength_profile.hpp>
+#include <decant/force/back_pressure.hpp>
 #include <decant/force/body_acceleration.hpp>
 #include <decant/force/concept.hpp>
 #include <decant/force/gradient_correction.hpp>

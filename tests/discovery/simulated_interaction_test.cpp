@@ -257,6 +257,89 @@ TEST_CASE("simulated interaction: leaks, losses and inflow take and bring what t
   CHECK(static_cast<double>(inflow.particles) - start == Approx(18e-6 / particle).margin(6));
 }
 
+TEST_CASE("simulated interaction: what acts for a while acts then, on the recording's clock") {
+  Pour::Scene scene = pour_scene();
+  for (double& time : scene.times) {  // a clock that does not begin at zero
+    time += 3;
+  }
+  std::vector<PoseTrack::Sample> samples = scene.motion[0].samples();
+  for (PoseTrack::Sample& sample : samples) {
+    sample.time += 3;
+  }
+  scene.motion[0] = PoseTrack(samples);
+  auto effects = pour_catalogue();
+  effects.push_back(passing_force_effect<PourModel>({3.25, 3.45}, 0.1, "for a while"));
+  effects.push_back(inflow_effect<PourModel>({0.03, 0, 0.1}, 2, "later", TimeWindow{.from = 3.31}, 0.1));
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(scene, effects, settings);
+  const auto plain = pour.predict({{}, 1, false});
+  const auto frames_that_differ = [&](const ModelRun& run) {
+    const auto seen = pour.predict(run);
+    std::vector<std::size_t> frames;
+    for (std::size_t frame = 0; frame < seen[0].frames(); ++frame) {
+      bool same = true;
+      for (Index row = 0; row < seen[0].rows(); ++row) {
+        for (Index column = 0; column < seen[0].columns(); ++column) {
+          same = same && seen[0].share(frame, row, column) == plain[0].share(frame, row, column);
+        }
+      }
+      if (!same) {
+        frames.push_back(frame);
+      }
+    }
+    return frames;
+  };
+  const ModelRun gust = run_with(pour, "lateral_force", {3, 0}, "for a while");
+  CHECK(frames_that_differ(gust) == std::vector<std::size_t>{3, 4, 5, 6});  // frames are 0.1 s apart
+  ModelRun later = gust;
+  later.effects[0].window = TimeWindow{3.45, 3.5};
+  CHECK(frames_that_differ(later) == std::vector<std::size_t>{5, 6});
+  // for as long as it lasts, and no longer
+  PourModel model = pour.started(gust);
+  const auto& pull = model.force<BodyAcceleration<float>>();
+  CHECK(pull.from - model.time() == Approx(0.25));
+  CHECK(pull.until - model.time() == Approx(0.45));
+  const std::vector<std::size_t> wet = frames_that_differ(run_with(pour, "inflow", {40}, "later"));
+  REQUIRE(!wet.empty());
+  CHECK(wet.front() == 4);
+}
+
+TEST_CASE("simulated interaction: obstacles go with their body, and necks hold liquid back") {
+  auto effects = pour_catalogue();
+  effects.push_back(obstacle_effect<PourModel>(0, {0.01, 0, 0.06}, "mouth"));
+  effects.push_back(back_pressure_effect<PourModel>({0, {0, 0, 0.07}, {0, 0, 1}, 0.07, 0.04}, "cup"));
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  ModelRun block = run_with(pour, "obstacle", {0.02});
+  PourModel model = pour.started(block);
+  REQUIRE(model.bodies().size() == 3);
+  const auto& cube = model.bodies()[2].surface->bounds();
+  CHECK((cube.min() - Vector3<double>(0, -0.01, 0.05)).norm() < 1e-12);
+  CHECK((cube.max() - Vector3<double>(0.02, 0.01, 0.07)).norm() < 1e-12);
+  for (const double turned_at : {0.0, 0.4}) {
+    const Pose cup = model.bodies()[0].motion.at(model.time() + turned_at);
+    const Pose with_it = model.bodies()[2].motion.at(model.time() + turned_at);
+    CHECK((cup * Vector3<double>(0.01, 0, 0.06) - with_it * Vector3<double>(0.01, 0, 0.06)).norm() < 1e-12);
+  }
+  block.effects[0].place = Vector3<double>(0, 0, 0.065);
+  CHECK(apart(pour.predict(block)[0], pour.predict({{}, 1, false})[0]) > 5);
+  CHECK(pour.started(run_with(pour, "obstacle", {1e-4})).bodies().size() == 2);  // no particle would feel it
+
+  const auto left_in_cup = [&](const ModelRun& run) {
+    PourModel poured = pour.started(run);
+    poured.watch_contents(0);
+    StepReport report;
+    for (int frame = 0; frame < 9; ++frame) {
+      report = poured.step(0.05);
+      REQUIRE(report.advanced());
+    }
+    return report.contents[0].volume;
+  };
+  CHECK(left_in_cup(run_with(pour, "back_pressure", {8})) > 1.3 * left_in_cup({{}, 1, false}));
+}
+
 TEST_CASE("simulated interaction: what is tolerated is drawn within its tolerance, by the seed") {
   const Pour pour = pour_of();
   double most_delay = 0, most_pull = 0;

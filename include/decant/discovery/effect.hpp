@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,6 +36,12 @@ enum class EffectKind {
   Nuisance  ///< a measurement's too, but only ever taken account of, not named: what it explains nothing else has to
 };
 
+/// When an effect acts, on the recording's clock [s]. Ends that are not finite are none.
+struct TimeWindow {
+  double from = -std::numeric_limits<double>::infinity();
+  double until = +std::numeric_limits<double>::infinity();
+};
+
 /// An effect that a model can be given at any strength.
 struct Effect {
   std::string name{};    ///< as scripts have it, such as "drag_linear"; several may have one name in different places
@@ -46,8 +53,11 @@ struct Effect {
   std::string where{};                     ///< the place in words, "floor of the cup"; empty if it has none
   std::optional<Vector3<double>> place{};  ///< where it acts [m], in the model's own frame for it
   double place_tolerance = 0;              ///< how far from there it may be as well [m]; 0: no other place is tried
+  std::optional<TimeWindow> window{};      ///< when it acts, if it does not all the time
+  double window_tolerance = 0;  ///< how much earlier or later finite ends of it may be [s]; 0: no others are tried
   std::string code{};  ///< C++ that adds it to a simulator: @ stands for the strength, one after another of its
-                       ///< components, and # for the place; empty where there is none
+                       ///< components, # for the place, and ~ for the window's ends, one after another; empty where
+                       ///< there is none
 
   /// The family, or the name where there is none.
   const std::string& answer() const noexcept { return family.empty() ? name : family; }
@@ -71,6 +81,10 @@ inline void validate(const Effect& effect) {
   expects(effect.place_tolerance >= 0 && std::isfinite(effect.place_tolerance), of + "place_tolerance [m]", ">= 0",
           effect.place_tolerance);
   expects(!effect.place || effect.place->allFinite(), of + "place [m]", "finite", "others");
+  expects(effect.window_tolerance >= 0 && std::isfinite(effect.window_tolerance), of + "window_tolerance [s]", ">= 0",
+          effect.window_tolerance);
+  expects(!effect.window || effect.window->from < effect.window->until, of + "window", "its beginning before its end",
+          effect.window ? effect.window->from : 0);
   for (const EffectComponent& each : effect.components) {
     expects(std::isfinite(each.low) && std::isfinite(each.high) && each.low <= each.base && each.base <= each.high &&
                 each.low < each.high,

@@ -117,6 +117,10 @@ inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& r
         key += text(x);
       }
     }
+    if (applied.window) {
+      key += " from " + text(applied.window->from);
+      key += " until " + text(applied.window->until);
+    }
   }
   return key;
 }

@@ -23,8 +23,8 @@
 
 namespace decant::inline DECANT_TARGET {
 
-/// A guess of strengths and places of one or more effects as one vector: of each effect its components, then its
-/// place's three coordinates [m], if it has one that is looked for.
+/// A guess of strengths, places and times of one or more effects as one vector: of each effect its components, then its
+/// place's three coordinates [m] and its window's finite ends [s], if it has any that are looked for.
 class EffectPoint {
  public:
   /// Takes one more effect. @param effect has to outlive the point. @param number of it among the model's effects.
@@ -33,13 +33,25 @@ class EffectPoint {
     const auto components = static_cast<Eigen::Index>(effect.components.size());
     expects(guess.strength.size() == components, "EffectPoint: strength", "a number for each component",
             guess.strength.size());
-    const bool placed = effect.place.has_value() && effect.place_tolerance > 0;
-    parts_.push_back({&effect, number, value_.size(), components, placed});
-    value_.conservativeResize(value_.size() + components + (placed ? 3 : 0));
-    value_.segment(parts_.back().begin, components) = guess.strength;
-    if (placed) {
-      value_.tail<3>() = guess.place.value_or(*effect.place);
+    Part part{&effect, number, value_.size(), components};
+    const Vector3<double> place = guess.place.value_or(effect.place.value_or(Vector3<double>::Zero()));
+    const TimeWindow window = guess.window.value_or(effect.window.value_or(TimeWindow{}));
+    part.coordinates = effect.place && effect.place_tolerance > 0 ? 3 : 0;
+    const bool timed = effect.window && effect.window_tolerance > 0;
+    part.begins = timed && std::isfinite(window.from) ? 1 : 0;
+    part.ends = timed && std::isfinite(window.until) ? 1 : 0;
+    value_.conservativeResize(value_.size() + part.size());
+    value_.segment(part.begin, components) = guess.strength;
+    if (part.coordinates > 0) {
+      value_.segment<3>(part.place()) = place;
     }
+    if (part.begins > 0) {
+      value_[part.time()] = window.from;
+    }
+    if (part.ends > 0) {
+      value_[part.time() + part.begins] = window.until;
+    }
+    parts_.push_back(part);
   }
 
   Eigen::Index size() const noexcept { return value_.size(); }
@@ -51,9 +63,14 @@ class EffectPoint {
   }
   AppliedEffect applied(std::size_t part) const {
     const Part& of = parts_.at(part);
-    AppliedEffect result{of.number, value_.segment(of.begin, of.components), {}};
-    if (of.placed) {
-      result.place = value_.segment<3>(of.begin + of.components);
+    AppliedEffect result{of.number, value_.segment(of.begin, of.components)};
+    if (of.coordinates > 0) {
+      result.place = value_.segment<3>(of.place());
+    }
+    if (of.begins + of.ends > 0) {
+      result.window = *of.effect->window;
+      result.window->from = of.begins > 0 ? value_[of.time()] : result.window->from;
+      result.window->until = of.ends > 0 ? value_[of.time() + of.begins] : result.window->until;
     }
     return result;
   }
@@ -61,7 +78,10 @@ class EffectPoint {
   /// How far off a number is tried to see what it changes.
   double step(Eigen::Index k) const {
     const Part& of = part_of(k);
-    if (k >= of.begin + of.components) {
+    if (k >= of.time()) {
+      return 0.4 * of.effect->window_tolerance;
+    }
+    if (k >= of.place()) {
       return 0.4 * of.effect->place_tolerance;
     }
     const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
@@ -70,8 +90,13 @@ class EffectPoint {
   /// The range of a number: strengths may be half as large again as those that are looked through at first.
   std::pair<double, double> range(Eigen::Index k) const {
     const Part& of = part_of(k);
-    if (k >= of.begin + of.components) {
-      const double middle = (*of.effect->place)[k - of.begin - of.components];
+    if (k >= of.time()) {
+      const bool end = of.begins == 0 || k > of.time();
+      const double middle = end ? of.effect->window->until : of.effect->window->from;
+      return {middle - of.effect->window_tolerance, middle + of.effect->window_tolerance};
+    }
+    if (k >= of.place()) {
+      const double middle = (*of.effect->place)[k - of.place()];
       return {middle - of.effect->place_tolerance, middle + of.effect->place_tolerance};
     }
     const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
@@ -98,8 +123,11 @@ class EffectPoint {
   struct Part {
     const Effect* effect;
     std::size_t number;
-    Eigen::Index begin, components;
-    bool placed;
+    Eigen::Index begin, components, coordinates = 0, begins = 0, ends = 0;  ///< how many numbers it has of each
+
+    Eigen::Index size() const noexcept { return components + coordinates + begins + ends; }
+    Eigen::Index place() const noexcept { return begin + components; }
+    Eigen::Index time() const noexcept { return place() + coordinates; }
   };
 
   const Part& part_of(Eigen::Index k) const {

@@ -25,6 +25,7 @@ struct AppliedEffect {
   std::size_t effect = 0;                  ///< its number in ForwardModel::effects()
   Eigen::VectorXd strength{};              ///< by component
   std::optional<Vector3<double>> place{};  ///< [m], where it is not the effect's own
+  std::optional<TimeWindow> window{};      ///< likewise
 };
 
 /// One run of a model.

@@ -3,6 +3,7 @@
 
 /// The catalogue of effects that a liquid simulation may lack, each with its unit, its range and what it does to a run.
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -13,11 +14,13 @@
 
 #include <Eigen/Core>
 
+#include <decant/boundary/shapes.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
+#include <decant/force/back_pressure.hpp>
 #include <decant/force/body_acceleration.hpp>
 #include <decant/force/gravity.hpp>
 #include <decant/force/linear_drag.hpp>
@@ -37,10 +40,10 @@ namespace decant::inline DECANT_TARGET {
 /// The default composition with every force that the catalogue can turn on. At strength zero they cost nothing.
 template <class ScalarType = float>
 struct EffectParts : DefaultParts<ScalarType> {
-  using Forces =
-      std::tuple<Gravity<ScalarType>, ShearThinningViscosity<ScalarType>, ResidualViscosity<ScalarType>,
-                 SurfaceTension<ScalarType>, LinearDrag<ScalarType>, QuadraticDrag<ScalarType>,
-                 BodyAcceleration<ScalarType>, Suction<ScalarType>, WallFriction<ScalarType>, WallAdhesion<ScalarType>>;
+  using Forces = std::tuple<Gravity<ScalarType>, ShearThinningViscosity<ScalarType>, ResidualViscosity<ScalarType>,
+                            SurfaceTension<ScalarType>, LinearDrag<ScalarType>, QuadraticDrag<ScalarType>,
+                            BodyAcceleration<ScalarType>, Suction<ScalarType>, BackPressure<ScalarType>,
+                            WallFriction<ScalarType>, WallAdhesion<ScalarType>>;
 };
 
 namespace detail {
@@ -56,19 +59,29 @@ struct WithForcesParts : Bundle {
 template <class Bundle, class... More>
 using WithForces = detail::WithForcesParts<Bundle, More...>;
 
-/// What may be missing from a force's own numbers: set(force, strength) changes the force before a run begins.
+/// A window on a recording's clock in the time of a model that starts at the first frame.
+template <class Model>
+TimeWindow in_model_time(const TimeWindow& window, const Model& model, double first_frame) noexcept {
+  return {model.time() + window.from - first_frame, model.time() + window.until - first_frame};
+}
+
+/// What may be missing from a force's own numbers: set(force, strength) changes the force before a run begins, or
+/// set(force, as), with all that is asked for; windows are then in the model's own time.
 template <class Force, class Model, class Set>
 InteractionEffect<Model> force_effect(Effect effect, Set set) {
   InteractionEffect<Model> result;
   static_cast<Effect&>(result) = std::move(effect);
-  result.apply = [set](const Eigen::VectorXd& strength, const Vector3<double>& place,
-                       InteractionChanges<Model>& changes) {
-    changes.of_model.push_back([=](Model& model) {
+  result.apply = [set](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+    changes.of_model.push_back([=, first = changes.first](Model& model) {
       Force& force = model.template force<Force>();
-      if constexpr (std::is_invocable_v<Set, Force&, const Eigen::VectorXd&, const Vector3<double>&>) {
-        set(force, strength, place);
+      if constexpr (std::is_invocable_v<Set, Force&, const AppliedEffect&>) {
+        AppliedEffect own = as;
+        if (own.window) {
+          own.window = in_model_time(*own.window, model, first);
+        }
+        set(force, own);
       } else {
-        set(force, strength[0]);
+        set(force, as.strength[0]);
       }
     });
   };
@@ -154,15 +167,37 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) 
                              "is not level",
                              {"x", 0, -1.2, 1.2, 0.03}, "simulator.force<BodyAcceleration<float>>().pull = {@, @, 0};");
   pull.components.push_back({"y", 0, -1.2, 1.2, 0.03});
-  effects.push_back(force_effect<BodyAcceleration<Scalar>, Model>(
-      pull, [](auto& force, const Eigen::VectorXd& s, const Vector3<double>&) {
-        force.pull = {static_cast<Scalar>(s[0]), static_cast<Scalar>(s[1]), Scalar(0)};
+  effects.push_back(
+      force_effect<BodyAcceleration<Scalar>, Model>(pull, [](BodyAcceleration<Scalar>& force, const AppliedEffect& as) {
+        force.pull = {static_cast<Scalar>(as.strength[0]), static_cast<Scalar>(as.strength[1]), Scalar(0)};
       }));
   effects.push_back(force_effect<Gravity<Scalar>, Model>(
       plain_effect("gravity", "", "m/s^2", "gravity is other than assumed", {"", 9.81, 7.85, 11.77},
                    "simulator.force<Gravity<float>>().acceleration *= @ / 9.81;"),
       [](auto& force, double s) { force.acceleration *= static_cast<Scalar>(s / 9.81); }));
   return effects;
+}
+
+/// A sideways pull that does not last. @param window about when [s]. @param tolerance of its ends. @param where in
+/// words: "in the beginning".
+template <class Model>
+InteractionEffect<Model> passing_force_effect(const TimeWindow& window, double tolerance, std::string where) {
+  using Scalar = typename Model::Scalar;
+  Effect effect =
+      detail::plain_effect("lateral_force", "", "m/s^2",
+                           "something pulls the liquid sideways for a while, such as a gust", {"x", 0, -1.2, 1.2},
+                           "auto& pull = simulator.force<BodyAcceleration<float>>(); pull.pull = {@, @, 0}; "
+                           "pull.from = ~; pull.until = ~;");
+  effect.components.push_back({"y", 0, -1.2, 1.2});
+  effect.window = window;
+  effect.window_tolerance = tolerance;
+  effect.where = std::move(where);
+  return force_effect<BodyAcceleration<Scalar>, Model>(
+      effect, [](BodyAcceleration<Scalar>& force, const AppliedEffect& as) {
+        force.pull = {static_cast<Scalar>(as.strength[0]), static_cast<Scalar>(as.strength[1]), Scalar(0)};
+        force.from = as.window->from;
+        force.until = as.window->until;
+      });
 }
 
 /// A pull toward a point. @param place [m], world frame. @param where in words.
@@ -175,19 +210,18 @@ InteractionEffect<Model> suction_effect(const Vector3<double>& place, std::strin
   effect.place = place;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
-  return force_effect<Suction<Scalar>, Model>(
-      effect, [](Suction<Scalar>& force, const Eigen::VectorXd& s, const Vector3<double>& point) {
-        force.strength = static_cast<Scalar>(s[0]);
-        force.point = point.template cast<Scalar>();
-      });
+  return force_effect<Suction<Scalar>, Model>(effect, [](Suction<Scalar>& force, const AppliedEffect& as) {
+    force.strength = static_cast<Scalar>(as.strength[0]);
+    force.point = as.place->template cast<Scalar>();
+  });
 }
 
 namespace detail {
 
-/// From now on and for good.
-inline std::vector<std::pair<double, double>> steady(double millilitres_per_second) {
+/// A flow in a window of time [s], or always.
+inline std::vector<std::pair<double, double>> steady(double millilitres_per_second, const TimeWindow& window = {}) {
   const double flow = 1e-6 * millilitres_per_second;  // [m^3/s]
-  return {{-1e6, flow}, {1e6, flow}};
+  return {{std::max(window.from, -1e6), flow}, {std::min(window.until, 1e6), flow}};
 }
 
 }  // namespace detail
@@ -202,20 +236,19 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
                            "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
   effect.where = std::move(where);
-  return detail::run_effect<Model>(
-      std::move(effect), EffectKind::Physics,
-      [body, below](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
-        OutletSettings outlet;
-        outlet.body = body;
-        outlet.position = at;
-        outlet.exit = at + below;
-        outlet.flow = detail::steady(s[0]);
-        changes.of_model.push_back([outlet](Model& model) {
-          OutletSettings own = outlet;
-          own.radius = 3 * model.spacing();
-          model.add_outlet(own);
-        });
-      });
+  return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                   [body, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                     OutletSettings outlet;
+                                     outlet.body = body;
+                                     outlet.position = *as.place;
+                                     outlet.exit = *as.place + below;
+                                     outlet.flow = detail::steady(as.strength[0]);
+                                     changes.of_model.push_back([outlet](Model& model) {
+                                       OutletSettings own = outlet;
+                                       own.radius = 3 * model.spacing();
+                                       model.add_outlet(own);
+                                     });
+                                   });
 }
 
 /// Liquid that a container loses everywhere: it evaporates, or the container soaks it up. @param radius around the
@@ -227,41 +260,97 @@ InteractionEffect<Model> loss_effect(BodyId body, const Vector3<double>& place, 
                                        "@}}, OutletOrder::Evenly});");
   effect.place = place;
   effect.where = std::move(where);
-  return detail::run_effect<Model>(
-      std::move(effect), EffectKind::Physics,
-      [body, radius](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
-        OutletSettings outlet;
-        outlet.body = body;
-        outlet.position = at;
-        outlet.radius = radius;
-        outlet.order = OutletOrder::Evenly;
-        outlet.flow = detail::steady(s[0]);
-        changes.of_model.push_back([outlet](Model& model) { model.add_outlet(outlet); });
-      });
+  return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                   [body, radius](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                     OutletSettings outlet;
+                                     outlet.body = body;
+                                     outlet.position = *as.place;
+                                     outlet.radius = radius;
+                                     outlet.order = OutletOrder::Evenly;
+                                     outlet.flow = detail::steady(as.strength[0]);
+                                     changes.of_model.push_back([outlet](Model& model) { model.add_outlet(outlet); });
+                                   });
 }
 
 /// Liquid that comes from somewhere else, falling. @param place [m], world frame. @param origin of its particles.
+/// @param window when. @param window_tolerance how much earlier or later its ends may be [s].
 template <class Model>
-InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin origin, std::string where) {
+InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin origin, std::string where,
+                                       const TimeWindow& window = {}, double window_tolerance = 0) {
   Effect effect =
       detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
-                           "simulator.add_inlet({{#}, down, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
+                           "simulator.add_inlet({{#}, down, radius, {{~, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
   effect.place = place;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
+  effect.window = window;
+  effect.window_tolerance = window_tolerance;
   return detail::run_effect<Model>(
-      std::move(effect), EffectKind::Physics,
-      [origin](const Eigen::VectorXd& s, const Vector3<double>& at, InteractionChanges<Model>& changes) {
+      std::move(effect), EffectKind::Physics, [origin](const AppliedEffect& as, InteractionChanges<Model>& changes) {
         InletSettings inlet;
-        inlet.position = at;
-        inlet.flow = detail::steady(s[0]);
-        changes.of_model.push_back([inlet, origin](Model& model) {
+        inlet.position = *as.place;
+        changes.of_model.push_back([inlet, origin, as, first = changes.first](Model& model) {
           InletSettings own = inlet;
+          own.flow = detail::steady(as.strength[0], in_model_time(*as.window, model, first));
           own.direction = model.settings().gravity;
           own.radius = model.spacing();
           model.add_inlet(own, origin);
         });
       });
+}
+
+/// Something solid that the model does not have, on a body and moving with it: a cube. @param place of its middle, in
+/// the body's frame [m]. @param where in words.
+template <class Model>
+InteractionEffect<Model> obstacle_effect(BodyId body, const Vector3<double>& place, std::string where) {
+  Effect effect = detail::plain_effect("obstacle", "", "m", "something solid is in the way (its strength is its size)",
+                                       {"", 0, 0, 0.03},
+                                       "simulator.add_body(\"obstacle\", cube at {#} of edge @, motion_of_container);");
+  effect.place = place;
+  effect.where = std::move(where);
+  effect.place_tolerance = 0.02;
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics, [body](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+        const Vector3<double> half = Vector3<double>::Constant(0.5 * as.strength[0]), middle = *as.place;
+        changes.of_model.push_back([=](Model& model) {
+          if (2 * half.x() > 0.2 * model.spacing()) {  // what is smaller no particle would feel
+            model.add_body("obstacle", Box{middle - half, middle + half}, model.bodies()[body].motion);
+          }
+        });
+      });
+}
+
+/// A container's narrow neck.
+struct Neck {
+  BodyId body = 0;
+  Vector3<double> mouth = Vector3<double>::Zero();  ///< its middle, in the body's frame [m]
+  Vector3<double> axis = Vector3<double>::UnitZ();  ///< out of it, in the body's frame, unit length
+  double length = 0, radius = 0;                    ///< [m]
+};
+
+/// Air that comes into a container only past the liquid that runs out. @param where in words.
+template <class Model>
+InteractionEffect<Model> back_pressure_effect(const Neck& neck, std::string where) {
+  using Scalar = typename Model::Scalar;
+  Effect effect =
+      detail::plain_effect("back_pressure", "", "m/s^2",
+                           "air cannot get in as fast as liquid wants to get out (a bottle that glugs)", {"", 0, 0, 8},
+                           "auto& air = simulator.force<BackPressure<float>>(); air.strength = @; air.mouth "
+                           "= {#}; air.container = motion_of_container;");
+  effect.place = neck.mouth;
+  effect.where = std::move(where);
+  return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                   [neck](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                     changes.of_model.push_back([neck, strength = as.strength[0]](Model& model) {
+                                       BackPressure<Scalar>& air = model.template force<BackPressure<Scalar>>();
+                                       air.strength = static_cast<Scalar>(strength);
+                                       air.mouth = neck.mouth;
+                                       air.axis = neck.axis;
+                                       air.reach = neck.length;
+                                       air.radius = neck.radius;
+                                       air.container = model.bodies()[neck.body].motion;
+                                     });
+                                   });
 }
 
 /// How much there is at first, over what the model assumes.
@@ -270,9 +359,8 @@ InteractionEffect<Model> fill_effect(double most = 1.25) {
   return detail::run_effect<Model>(
       detail::plain_effect("fill", "", "", "there is more or less liquid than assumed (over what is assumed)",
                            {"", 1, 0.75, most, 0.02}, "fill(simulator, container, FillAmount::fraction(@ * assumed));"),
-      EffectKind::Physics, [](const Eigen::VectorXd& s, const Vector3<double>&, InteractionChanges<Model>& changes) {
-        changes.fill = s[0];
-      });
+      EffectKind::Physics,
+      [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.fill = as.strength[0]; });
 }
 
 /// What may be wrong with poses and cameras. @param bodies their names, in the order of the scene's motions.
@@ -281,40 +369,35 @@ std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std:
   using detail::plain_effect;
   using detail::run_effect;
   using Changes = InteractionChanges<Model>;
-  using Strength = Eigen::VectorXd;
   std::vector<InteractionEffect<Model>> effects;
   effects.push_back(run_effect<Model>(
       plain_effect("latency", "", "s", "poses were recorded too late (too early, where negative)",
                    {"", 0, -0.12, 0.12, 0.008}, ""),
-      EffectKind::Measurement,
-      [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.pose_delay = s[0]; }));
+      EffectKind::Measurement, [](const AppliedEffect& as, Changes& changes) { changes.pose_delay = as.strength[0]; }));
   for (std::size_t body = 0; body < bodies.size(); ++body) {
-    Effect offset = plain_effect("body_pose", "", "m", "a body is not where its poses say", {"x", 0, -0.02, 0.02, 2e-3},
-                                 "pose.translation += Eigen::Vector3d(@, @, @);");
-    offset.components.push_back({"y", 0, -0.02, 0.02, 2e-3});
-    offset.components.push_back({"z", 0, -0.02, 0.02, 2e-3});
+    Effect offset = plain_effect("body_pose", "", "m", "a body is not where its poses say",
+                                 {"x", 0, -0.02, 0.02, 1.5e-3}, "pose.translation += Eigen::Vector3d(@, @, @);");
+    offset.components.push_back({"y", 0, -0.02, 0.02, 1.5e-3});
+    offset.components.push_back({"z", 0, -0.02, 0.02, 1.5e-3});
     offset.where = bodies[body];
-    effects.push_back(run_effect<Model>(offset, EffectKind::Measurement,
-                                        [body](const Strength& s, const Vector3<double>&, Changes& changes) {
-                                          changes.body_offset.at(body) = s.head<3>();
-                                        }));
+    effects.push_back(run_effect<Model>(
+        offset, EffectKind::Measurement,
+        [body](const AppliedEffect& as, Changes& changes) { changes.body_offset.at(body) = as.strength.head<3>(); }));
   }
   Effect shift =
       plain_effect("camera_shift", "", "px", "the camera has moved, which shifts its picture", {"u", 0, -4, 4, 1}, "");
   shift.components.push_back({"v", 0, -4, 4, 1});
-  effects.push_back(run_effect<Model>(
-      shift, EffectKind::Nuisance,
-      [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.camera_shift = s.head<2>(); }));
+  effects.push_back(run_effect<Model>(shift, EffectKind::Nuisance, [](const AppliedEffect& as, Changes& changes) {
+    changes.camera_shift = as.strength.head<2>();
+  }));
   effects.push_back(run_effect<Model>(
       plain_effect("camera_roll", "camera_shift", "rad", "the camera has turned about its axis",
                    {"", 0, -0.02, 0.02, 0.005}, ""),
-      EffectKind::Nuisance,
-      [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.camera_roll = s[0]; }));
+      EffectKind::Nuisance, [](const AppliedEffect& as, Changes& changes) { changes.camera_roll = as.strength[0]; }));
   effects.push_back(run_effect<Model>(
       plain_effect("mask_bias", "", "px", "masks are fatter than the liquid (thinner, where negative)",
                    {"", 0, -2, 2, 0.7}, ""),
-      EffectKind::Nuisance,
-      [](const Strength& s, const Vector3<double>&, Changes& changes) { changes.mask_growth = s[0]; }));
+      EffectKind::Nuisance, [](const AppliedEffect& as, Changes& changes) { changes.mask_growth = as.strength[0]; }));
   return effects;
 }
 

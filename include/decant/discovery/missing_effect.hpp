@@ -77,11 +77,12 @@ struct RefinedEffect {
   std::size_t effect = 0;
   Eigen::VectorXd strength{};
   Eigen::VectorXd deviation{};             ///< standard deviation, by component
-  std::optional<Vector3<double>> place{};  ///< [m], where it has one
+  std::optional<Vector3<double>> place{};  ///< [m], where it was looked for
+  std::optional<TimeWindow> window{};      ///< likewise
   double distance = 0;                     ///< that is left of the recordings it was found in
   double share = 0;                        ///< of what is reducible
 
-  AppliedEffect applied() const { return {effect, strength, place}; }
+  AppliedEffect applied() const { return {effect, strength, place, window}; }
   /// Strengths that hold the truth with 90 %, by component.
   std::pair<double, double> interval_90(std::size_t component) const {
     const auto k = static_cast<Eigen::Index>(component);
@@ -367,7 +368,7 @@ class MissingEffectSearch {
         const AppliedEffect applied = points[k].applied(part);
         const auto [begin, count] = points[k].strength_of(part);
         one.effects.push_back({applied.effect, applied.strength, deviation.segment(begin, count), applied.place,
-                               one.distance, one.share});
+                               applied.window, one.distance, one.share});
       }
       refined.push_back(std::move(one));
     }

@@ -57,6 +57,7 @@ struct InteractionScene {
 /// What effects can change about a run.
 template <class Model>
 struct InteractionChanges {
+  double first = 0;                                     ///< the first frame, from which models run on [s]
   double fill = 1;                                      ///< over what the model assumes
   double pose_delay = 0;                                ///< poses were recorded so late [s]
   std::vector<Vector3<double>> body_offset{};           ///< by body: where it is off its recorded pose [m], world frame
@@ -67,11 +68,10 @@ struct InteractionChanges {
 };
 
 /// An effect, and what it does to a run.
-/// apply(strength, place, changes): strength by component, place as Effect::place or as it is asked for.
+/// apply(as, changes): with place and window as they are asked for, or the effect's own.
 template <class Model>
 struct InteractionEffect : Effect {
-  std::function<void(const Eigen::VectorXd& strength, const Vector3<double>& place, InteractionChanges<Model>& changes)>
-      apply{};
+  std::function<void(const AppliedEffect& as, InteractionChanges<Model>& changes)> apply{};
 };
 
 /// Settings of SimulatedInteraction.
@@ -129,9 +129,10 @@ class SimulatedInteraction {
     auto& [changes, spacing] = result;
     changes.body_offset.assign(scene_.motion.size(), Vector3<double>::Zero());
     spacing = 1;
-    std::vector<Eigen::VectorXd> strength;
+    changes.first = scene_.times.front();
+    std::vector<AppliedEffect> as;
     for (const Effect& effect : effects_) {
-      strength.push_back(effect.base());
+      as.push_back({as.size(), effect.base(), effect.place, effect.window});
     }
     if (run.tolerated) {
       std::mt19937 random(run.seed);
@@ -142,15 +143,11 @@ class SimulatedInteraction {
         for (std::size_t component = 0; component < effects_[k].components.size(); ++component) {
           const EffectComponent& of = effects_[k].components[component];
           if (of.tolerance > 0 && effects_[k].kind != EffectKind::Nuisance) {
-            strength[k][static_cast<Eigen::Index>(component)] =
+            as[k].strength[static_cast<Eigen::Index>(component)] =
                 std::clamp(of.base + (2 * draw() - 1) * of.tolerance, of.low, of.high);
           }
         }
       }
-    }
-    std::vector<Vector3<double>> place;
-    for (const Effect& effect : effects_) {
-      place.push_back(effect.place.value_or(Vector3<double>::Zero()));
     }
     for (const AppliedEffect& applied : run.effects) {
       expects(applied.effect < effects_.size(), "ModelRun: effect", "one of the model's", applied.effect);
@@ -159,12 +156,14 @@ class SimulatedInteraction {
                   applied.strength.allFinite(),
               "ModelRun: strength of '" + effect.name + "'", "a finite number for each component",
               applied.strength.size());
-      strength[applied.effect] = applied.strength;
-      place[applied.effect] = applied.place.value_or(place[applied.effect]);
+      AppliedEffect& own = as[applied.effect];
+      own.strength = applied.strength;
+      own.place = applied.place ? applied.place : own.place;
+      own.window = applied.window ? applied.window : own.window;
     }
     for (std::size_t k = 0; k < effects_.size(); ++k) {
-      if (strength[k] != effects_[k].base()) {
-        apply_[k](strength[k], place[k], changes);
+      if (as[k].strength != effects_[k].base()) {
+        apply_[k](as[k], changes);
       }
     }
     return result;

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// What a simulation lacks, on twins of pours in which something is hidden (record_effect), with the answers scored:
+//   effect_experiment FOLDER --kinds nothing,moderate --json OUT.json --report OUT.html
+// Recordings, runs of models and answers are kept in the folder: an experiment that was stopped goes on where it was.
+// Exit status 0: done; 2: a recording, a file or an argument is wrong.
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "support/effect_experiment.hpp"
+#include "support/effect_tables.hpp"
+#include "support/experiment_output.hpp"
+#include "support/tool.hpp"
+
+int main(int count, char** values) {
+  std::string folder, json_file, report_file;
+  example::CaseRange range = example::CaseRange::Develop;
+  std::vector<std::string> kinds{"nothing", "moderate", "weak", "outside", "measurement"};
+  int first = 0, most = 1000;
+  std::vector<std::size_t> scenarios;
+  example::EffectExperimentOptions options;
+  double reality_mm = 1e3 * options.recording.spacing, model_mm = 1e3 * options.model.model.spacing;
+  CLI::App app("Finds what a simulation lacks in pours in which something is hidden, and scores the answers.");
+  app.add_option("folder", folder, "where recordings, runs and answers are kept")->required();
+  app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
+      ->transform(CLI::CheckedTransformer(example::case_ranges()));
+  app.add_option("--kinds", kinds, "nothing, moderate, weak, outside, measurement; several by commas")
+      ->delimiter(',')
+      ->check(CLI::IsMember(example::case_kinds()));
+  app.add_option("--first", first, "number of the first case of each kind")->check(CLI::Range(0, 1000000));
+  app.add_option("--cases", most, "of each kind, at most")->check(CLI::Range(1, 1000000));
+  app.add_option("--scenarios", scenarios, "only cases of these, several by commas")->delimiter(',');
+  app.add_flag("--both", options.both, "learns from both pours of a case, and holds out none");
+  app.add_option("--threads", options.threads, "recordings or runs side by side, each on one thread; 0: one per core")
+      ->check(CLI::Range(0, 1024));
+  app.add_option("--model-spacing-mm", model_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--draws", options.search.dictionary.draws,
+                 "runs with all that is tolerated drawn, to know what chance does")
+      ->check(CLI::Range(5, 1000));
+  app.add_option("--json", json_file, "writes results and tables");
+  app.add_option("--report", report_file, "writes a page with tables, for a browser");
+  app.add_flag("--again", options.again, "judges anew what is there already; recordings and runs are kept");
+  // smaller recordings, for tests; group "" is not in the help
+  app.add_option("--seconds", options.recording.longest)->check(CLI::Range(0.1, 60.0))->group("");
+  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
+  return example::run_tool(app, count, values, [&] {
+    options.folder = folder;
+    options.recording.spacing = 1e-3 * reality_mm;
+    options.model.model.spacing = 1e-3 * model_mm;
+    example::expect_writable({json_file, report_file});
+    std::vector<example::EffectCase> cases;
+    for (const std::string& kind : kinds) {
+      const example::CaseKind of = example::case_kinds().at(kind);
+      const int end = std::min(first + most, example::usual_cases(range, of));
+      for (int number = first; number < end; ++number) {
+        cases.push_back(example::effect_case(range, of, number));
+      }
+    }
+    std::erase_if(cases, [&](const example::EffectCase& each) {
+      return !scenarios.empty() && std::find(scenarios.begin(), scenarios.end(), each.scenario) == scenarios.end();
+    });
+    // cases of one scenario after the other, which find their runs in memory
+    std::stable_sort(cases.begin(), cases.end(), [](const auto& a, const auto& b) { return a.scenario < b.scenario; });
+    example::EffectExperiment experiment(options);
+    experiment.record(cases);
+    experiment.run(cases);
+    return example::tell_experiment(
+        {"What the model lacks", 2 * cases.size(), 3, reality_mm,
+         decant::detail::number_text(model_mm) + " mm in the model. What is hidden is not told to the search."},
+        experiment.folder(), example::effect_tables(experiment, cases), json_file, report_file);
+  });
+}

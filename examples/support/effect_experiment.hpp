@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Pours in which something is hidden, and what the workflow for missing effects says of them.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/core/stopwatch.hpp>
+#include <decant/discovery/missing_effect.hpp>
+#include <decant/hypothesis/thread_executor.hpp>
+#include <decant/io/journal.hpp>
+#include <decant/io/recording_reader.hpp>
+#include <decant/version.hpp>
+
+#include "effect_twin.hpp"
+#include "experiment_folder.hpp"
+#include "missing_effect_output.hpp"
+#include "recorded_interaction.hpp"
+
+namespace example {
+
+struct EffectExperimentOptions {
+  std::filesystem::path folder;  ///< of the recordings, with results/ and runs/ in it
+  EffectRecordingSettings recording{};
+  InteractionOptions model{};
+  decant::MissingEffectSettings search{};
+  bool both = false;   ///< learns from both pours of a case, and holds out none
+  int threads = 0;     ///< how many recordings or runs are in work side by side; 0: one per core
+  bool again = false;  ///< judges anew what is there already
+};
+
+/// "develop_moderate_007"
+inline std::string case_name(const EffectCase& of) {
+  std::string number = std::to_string(of.number);
+  number.insert(0, number.size() < 3 ? 3 - number.size() : 0, '0');
+  return of.range + "_" + of.kind + "_" + number;
+}
+
+/// Makes both recordings of each case and judges them, or finds both in its folder. Runs of the model are kept by
+/// scenario, as all cases of one share most of them.
+class EffectExperiment {
+ public:
+  /// Throws std::runtime_error where the folder cannot be written to.
+  explicit EffectExperiment(EffectExperimentOptions options)
+      : options_(std::move(options)),
+        recordings_(options_.folder, options_.threads, false),
+        folder_(options_.folder, 1, options_.again),  // a case after the other: its runs are made side by side
+        executor_({options_.threads}) {
+    decant::detail::make_folder(options_.folder / "runs");
+  }
+
+  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
+  void record(const std::vector<EffectCase>& cases) {
+    std::vector<ExperimentRecording> recordings;
+    for (const EffectCase& each : cases) {
+      for (const std::size_t which : {0, 1}) {
+        const EffectRecordingSettings settings = options_.recording;
+        recordings.push_back({recording_name(each, which), each.seed, settings.spacing, frames(each, which),
+                              [each, which, settings](const auto& folder, const auto& progress) {
+                                record_effect_pour(each, which, folder, settings, progress);
+                              }});
+      }
+    }
+    recordings_.record(recordings);
+  }
+
+  /// Judges what is not judged yet.
+  void run(const std::vector<EffectCase>& cases) {
+    std::vector<ExperimentJob> jobs;
+    for (const EffectCase& each : cases) {
+      jobs.push_back({key(each), settings_json(each), [this, each](const auto&) { return judge(each); }});
+    }
+    folder_.run("finding effects", jobs);
+  }
+
+  /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
+  const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
+  const ExperimentFolder& folder() const { return folder_; }
+  std::size_t recorded() const { return recordings_.recorded(); }
+
+ private:
+  std::string key(const EffectCase& of) const { return case_name(of) + (options_.both ? "_both" : ""); }
+  static std::string recording_name(const EffectCase& of, std::size_t which) {
+    return case_name(of) + (which == 0 ? "_a" : "_b");
+  }
+  std::size_t frames(const EffectCase& of, std::size_t which) const {
+    const double seconds =
+        std::min(effect_scenarios().at(of.scenario).pours.at(which).duration, options_.recording.longest);
+    return static_cast<std::size_t>(std::max(1L, std::lround(seconds * EffectRecordingSettings::frames_per_second)));
+  }
+
+  // What a result depends on, beside the program.
+  nlohmann::json settings_json(const EffectCase& of) const {
+    return {{"case", case_name(of)},
+            {"both", options_.both},
+            {"model_spacing_mm", 1e3 * options_.model.model.spacing},
+            {"reality_spacing_mm", 1e3 * options_.recording.spacing},
+            {"draws", options_.search.dictionary.draws},
+            {"longest_s", number_json(options_.recording.longest)}};
+  }
+
+  nlohmann::json judge(const EffectCase& of) {
+    std::vector<RecordedInteraction> kept;
+    for (const std::size_t which : {0, 1}) {
+      kept.push_back(recorded_interaction(decant::read_recording(recordings_.recording(recording_name(of, which))),
+                                          options_.model));
+    }
+    std::vector<decant::Interaction<RecordedModel>> learn{kept[0].interaction("a")}, held_out;
+    (options_.both ? learn : held_out).push_back(kept[1].interaction("b"));
+    decant::Journal journal(options_.folder / "runs" / ("scenario_" + std::to_string(of.scenario) + ".journal"),
+                            std::string("effect_experiment of decant ") + DECANT_VERSION + " at " +
+                                decant::detail::number_text(1e3 * options_.model.model.spacing) + " mm");
+    std::size_t computed = 0;
+    const decant::RunJobs run_jobs = [&](const std::vector<std::string>& keys,
+                                         const std::function<decant::JobResult(std::size_t)>& work) {
+      return decant::run_journaled(executor_, journal, keys, work,
+                                   [&](std::size_t, const decant::JobResult&) { ++computed; });
+    };
+    double milliseconds = 0;
+    decant::MissingEffect found;
+    {
+      const decant::Stopwatch watch(milliseconds);
+      found =
+          decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs, options_.search)
+              .find();
+    }
+    nlohmann::json json = missing_effect_json(kept[0].model.effects(), found);
+    json["status"] = "ok";
+    json["seconds"] = 1e-3 * milliseconds;
+    json["runs_computed"] = computed;
+    json["truth"] = recordings_.truth(recording_name(of, 0));
+    return json;
+  }
+
+  EffectExperimentOptions options_;
+  ExperimentFolder recordings_, folder_;
+  decant::ThreadExecutor executor_;
+};
+
+}  // namespace example

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The scores of the experiment with hidden effects, for terminals, scripts and browsers.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <decant/io/detail/text.hpp>
+
+#include "effect_cases.hpp"
+#include "effect_experiment.hpp"
+#include "experiment_report.hpp"
+
+namespace example {
+
+/// How an answer is to be taken.
+enum class AnswerScore {
+  Right,    ///< what is hidden is named, or rightly nothing; an error of measurement may be taken account of unnamed
+  Wrong,    ///< something is named that is not there
+  OneOf,    ///< what is hidden is among those that are not told apart
+  Missed,   ///< nothing is said to be missing
+  Abstains  ///< there is a gap that nothing explains: right where something outside of the catalogue is hidden
+};
+
+namespace detail {
+
+/// Effects that count as one name.
+inline std::string family_of(const std::string& name) {
+  static const std::map<std::string, std::string> families{{"drag_linear", "drag"},
+                                                           {"drag_quadratic", "drag"},
+                                                           {"shear_thinning", "viscosity"},
+                                                           {"camera_shift", "camera"},
+                                                           {"camera_roll", "camera"}};
+  const auto found = families.find(name);
+  return found == families.end() ? name : found->second;
+}
+
+inline bool is_measurement(const std::string& family) {
+  static const std::set<std::string> errors{"fill", "latency", "body_pose", "camera", "mask_bias"};
+  return errors.contains(family);
+}
+
+/// A case's result, and what the score needs of it.
+struct EffectScore {
+  const EffectCase* of;
+  const nlohmann::json* result;
+
+  std::string verdict() const { return result->at("verdict"); }
+  std::string truth() const { return result->at("truth").at("family"); }
+  std::string role() const { return result->at("truth").at("role"); }
+  /// Families of what is answered, each once.
+  std::set<std::string> families() const {
+    std::set<std::string> names;
+    for (const auto& name : result->at("effect")) {
+      names.insert(family_of(name));
+    }
+    return names;
+  }
+  /// In one word or several.
+  std::string answer() const {
+    if (verdict() == "nothing" || verdict() == "unexplained") {
+      return verdict();
+    }
+    std::string text;
+    for (const std::string& family : families()) {
+      text += text.empty() ? "" : verdict() == "one_of" ? " or " : " + ";
+      text += family;
+    }
+    return text;
+  }
+  /// Whether physics is blamed: something is named that is no error of measurement.
+  bool blames_physics() const {
+    const auto names = families();
+    return (verdict() == "named" || verdict() == "one_of") &&
+           std::any_of(names.begin(), names.end(), [](const auto& name) { return !is_measurement(name); });
+  }
+
+  AnswerScore score() const {
+    const std::set<std::string> names = families();
+    if (verdict() == "unexplained") {
+      return role() == "outside" ? AnswerScore::Right : AnswerScore::Abstains;
+    }
+    if (verdict() == "nothing") {
+      return role() == "nothing" || role() == "measurement" ? AnswerScore::Right : AnswerScore::Missed;
+    }
+    if (!names.contains(truth())) {
+      return AnswerScore::Wrong;
+    }
+    return verdict() == "one_of" ? AnswerScore::OneOf : names.size() == 1 ? AnswerScore::Right : AnswerScore::Wrong;
+  }
+
+  /// The strength that is found over the hidden one, where the very effect is named and has one number; else NaN.
+  double strength_ratio() const {
+    const nlohmann::json& truth = result->at("truth");
+    return comparable() ? number_at(*result, "/strength") / strength_in_model(truth)
+                        : std::numeric_limits<double>::quiet_NaN();
+  }
+  bool interval_holds() const {
+    const double strength = strength_in_model(result->at("truth"));
+    return number_at(*result, "/interval_90/0") <= strength && strength <= number_at(*result, "/interval_90/1");
+  }
+  bool comparable() const {
+    return verdict() == "named" && result->at("effect").size() == 1 &&
+           result->at("effect").front() == result->at("truth").at("effect") && result->at("strength").is_number();
+  }
+  double gap(const char* key) const { return number_at(*result, std::string("/gap/") + key); }
+  /// Of what is reducible of the gap of the pour that was not used.
+  double held_out_share() const {
+    return (gap("held_out_before") - gap("held_out_after")) / (gap("held_out_before") - gap("held_out_noise"));
+  }
+
+ private:
+  /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own.
+  static double strength_in_model(const nlohmann::json& truth) {
+    const double strength = number_at(truth, "/strength");
+    const std::string name = truth.at("effect");
+    return name == "gravity" ? 9.81 * (1 + strength) : name == "fill" ? 1 + strength : strength;
+  }
+};
+
+inline std::vector<EffectScore> scores_of(const EffectExperiment& experiment, const std::vector<EffectCase>& cases) {
+  std::vector<EffectScore> scores;
+  for (const EffectCase& each : cases) {
+    scores.push_back({&each, &experiment.result(each)});
+  }
+  return scores;
+}
+
+/// Of a share, at 95 % (Wilson 1927), in per cent.
+inline std::string share_interval(std::size_t count, std::size_t of) {
+  const double z = 1.96, n = static_cast<double>(of), p = static_cast<double>(count) / n;
+  const double middle = (p + z * z / (2 * n)) / (1 + z * z / n);
+  const double half = z / (1 + z * z / n) * std::sqrt(p * (1 - p) / n + z * z / (4 * n * n));
+  return decant::detail::fixed_text(100 * std::max(0.0, middle - half), 0) + " .. " +
+         decant::detail::fixed_text(100 * std::min(1.0, middle + half), 0);
+}
+
+inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores) {
+  ExperimentSection section{"Answers", decant::Table({"hidden", "cases", "right", "right [%]", "95 % of that [%]",
+                                                      "wrong", "one of", "missed", "unexplained", "physics blamed"})};
+  std::vector<std::string> kinds;
+  for (const EffectScore& each : scores) {
+    if (std::find(kinds.begin(), kinds.end(), each.of->kind) == kinds.end()) {
+      kinds.push_back(each.of->kind);
+    }
+  }
+  for (const std::string& kind : kinds) {
+    std::map<AnswerScore, std::size_t> count;
+    std::size_t all = 0, physics = 0;
+    for (const EffectScore& each : scores) {
+      if (each.of->kind == kind) {
+        ++all;
+        ++count[each.score()];
+        physics += each.blames_physics() ? 1 : 0;
+      }
+    }
+    const auto text = [&](AnswerScore score) { return std::to_string(count[score]); };
+    section.table.add({kind, std::to_string(all), text(AnswerScore::Right),
+                       percent_text(static_cast<double>(count[AnswerScore::Right]) / static_cast<double>(all), 0),
+                       share_interval(count[AnswerScore::Right], all), text(AnswerScore::Wrong),
+                       text(AnswerScore::OneOf), text(AnswerScore::Missed), text(AnswerScore::Abstains),
+                       std::to_string(physics)});
+    section.json[kind] = {{"cases", all},
+                          {"right", count[AnswerScore::Right]},
+                          {"wrong", count[AnswerScore::Wrong]},
+                          {"one_of", count[AnswerScore::OneOf]},
+                          {"missed", count[AnswerScore::Missed]},
+                          {"unexplained", count[AnswerScore::Abstains]},
+                          {"physics_blamed", physics}};
+  }
+  return section;
+}
+
+/// What is hidden by what is answered.
+inline ExperimentSection confusion(const std::vector<EffectScore>& scores) {
+  std::map<std::string, std::map<std::string, int>> count;
+  std::set<std::string> answers;
+  for (const EffectScore& each : scores) {
+    ++count[each.role() == "outside" ? "outside: " + each.result->at("truth").at("effect").get<std::string>()
+                                     : each.truth()][each.answer()];
+    answers.insert(each.answer());
+  }
+  std::vector<std::string> header{"hidden \\ answered"};
+  header.insert(header.end(), answers.begin(), answers.end());
+  ExperimentSection section{"What is answered, by what is hidden", decant::Table(header)};
+  for (const auto& [hidden, by_answer] : count) {
+    std::vector<std::string> row{hidden};
+    for (const std::string& answer : answers) {
+      const auto found = by_answer.find(answer);
+      row.push_back(found == by_answer.end() ? "" : std::to_string(found->second));
+    }
+    section.table.add(row);
+  }
+  return section;
+}
+
+inline ExperimentSection strengths_and_held_out(const std::vector<EffectScore>& scores) {
+  ExperimentSection section{"Strengths, and the pour that was not used",
+                            decant::Table({"figure", "value", "of cases"})};
+  std::vector<double> off, share;
+  std::size_t held = 0, confirmed = 0, refuted = 0, not_testable = 0, right = 0, better = 0, rivals = 0, wrong = 0,
+              caught = 0;
+  for (const EffectScore& each : scores) {
+    if (std::isfinite(each.strength_ratio())) {
+      off.push_back(std::abs(each.strength_ratio() - 1));
+      held += each.interval_holds() ? 1 : 0;
+    }
+    const nlohmann::json& confirmation = each.result->at("confirmed");
+    if (each.score() == AnswerScore::Right && each.verdict() == "named") {
+      ++right;
+      confirmed += confirmation == true ? 1 : 0;
+      refuted += confirmation == false ? 1 : 0;
+      not_testable += confirmation == "not_testable" ? 1 : 0;
+      if (confirmation.is_boolean()) {
+        share.push_back(each.held_out_share());
+        if (std::isfinite(each.gap("best_rival_held_out"))) {
+          ++rivals;
+          better += each.gap("held_out_after") < each.gap("best_rival_held_out") ? 1 : 0;
+        }
+      }
+    }
+    if (each.score() == AnswerScore::Wrong) {
+      ++wrong;
+      caught += confirmation == true ? 0 : 1;
+    }
+  }
+  const auto add = [&](const char* figure, const std::string& value, std::size_t of) {
+    section.table.add({figure, value, std::to_string(of)});
+  };
+  add("strength off by, median [%]", percent_text(median_of(off), 0), off.size());
+  add("90 % interval holds the strength", std::to_string(held), off.size());
+  add("rightly named: confirmed", std::to_string(confirmed), right);
+  add("... not testable on the other pour", std::to_string(not_testable), right);
+  add("... refuted", std::to_string(refuted), right);
+  add("... gap of the other pour shrinks by, median [% of what is reducible]", percent_text(median_of(share), 0),
+      share.size());
+  add("... better than the best rival there", std::to_string(better), rivals);
+  add("wrongly named: not confirmed", std::to_string(caught), wrong);
+  return section;
+}
+
+inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
+  using decant::detail::fixed_text;
+  ExperimentSection section{
+      "Cases", decant::Table({"case", "scenario", "hidden", "strength", "answer", "strength found", "90 %", "gap",
+                              "noise", "largest by chance", "after", "other pour", "after", "confirmed"})};
+  for (const EffectScore& each : scores) {
+    const nlohmann::json& result = *each.result;
+    const nlohmann::json& truth = result.at("truth");
+    std::string hidden = truth.at("effect");
+    if (truth.contains("variant")) {
+      hidden += ", ";
+      hidden += truth.at("variant").get<std::string>();
+    }
+    std::string found = result.contains("strength") ? result.at("strength").dump() : "";
+    std::string interval = result.contains("interval_90") ? result.at("interval_90").dump() : "";
+    const nlohmann::json& confirmed = result.at("confirmed");
+    section.table.add({case_name(*each.of), std::to_string(each.of->scenario), hidden,
+                       truth.contains("strength") ? three_digits(truth.at("strength").get<double>()) : "",
+                       each.answer(), found, interval, fixed_text(each.gap("before"), 2),
+                       fixed_text(each.gap("noise"), 2), fixed_text(each.gap("largest_by_chance"), 2),
+                       fixed_text(each.gap("after"), 2), fixed_text(each.gap("held_out_before"), 2),
+                       fixed_text(each.gap("held_out_after"), 2), confirmed.is_null() ? "" : confirmed.dump()});
+  }
+  return section;
+}
+
+}  // namespace detail
+
+inline std::vector<ExperimentSection> effect_tables(const EffectExperiment& experiment,
+                                                    const std::vector<EffectCase>& cases) {
+  const std::vector<detail::EffectScore> scores = detail::scores_of(experiment, cases);
+  return {detail::answers_by_kind(scores), detail::confusion(scores), detail::strengths_and_held_out(scores),
+          detail::all_cases(scores)};
+}
+
+}  // namespace example

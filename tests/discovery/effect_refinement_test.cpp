@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#include <decant/discovery/effect_refinement.hpp>
+
+#include <algorithm>
+#include <initializer_list>
+#include <limits>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "catch.hpp"
+
+using namespace decant;
+
+namespace {
+
+Effect named(const char* name, std::vector<EffectComponent> components) {
+  Effect effect;
+  effect.name = name;
+  effect.components = std::move(components);
+  return effect;
+}
+
+Eigen::VectorXd numbers(std::initializer_list<double> values) {
+  Eigen::VectorXd result(static_cast<Eigen::Index>(values.size()));
+  std::copy(values.begin(), values.end(), result.begin());
+  return result;
+}
+
+}  // namespace
+
+TEST_CASE("effect point: strengths, places and times of several effects are one vector") {
+  const Effect drag = named("drag", {{"", 0, 0, 4}});
+  Effect tap = named("tap", {{"", 0, 0, 40}});
+  tap.place = Vector3<double>(0.1, 0.2, 0.3);
+  tap.place_tolerance = 0.04;
+  tap.window = TimeWindow{.from = 1};
+  tap.window_tolerance = 0.5;
+  Effect gust = named("gust", {{"x", 0, -1, 1}, {"y", 0, -1, 1}});
+  gust.window = TimeWindow{0.5, 1.5};
+  gust.window_tolerance = 0.2;
+
+  EffectPoint point;
+  point.add(drag, 7, {7, numbers({1.5})});
+  point.add(tap, 3, {3, numbers({20}), Vector3<double>(0.11, 0.2, 0.3), TimeWindow{.from = 0.9}});
+  point.add(gust, 5, {5, numbers({0.4, -0.3})});
+  REQUIRE(point.effects() == 3);
+  CHECK(point.value() == numbers({1.5, 20, 0.11, 0.2, 0.3, 0.9, 0.4, -0.3, 0.5, 1.5}));
+  CHECK(point.strength_of(2) == std::pair<Eigen::Index, Eigen::Index>{6, 2});
+
+  // what is asked for is what comes back
+  const EffectPoint other = point.with(5, 1.2).with(9, 1.65).with(3, 0.23);
+  const AppliedEffect of_tap = other.applied(1), of_gust = other.applied(2);
+  CHECK(of_tap.effect == 3);
+  CHECK(of_tap.place->isApprox(Vector3<double>(0.11, 0.23, 0.3)));
+  CHECK(of_tap.window->from == 1.2);
+  CHECK(of_tap.window->until == TimeWindow{}.until);
+  CHECK(of_gust.strength == numbers({0.4, -0.3}));
+  CHECK_FALSE(of_gust.place);
+  CHECK(of_gust.window->from == 0.5);
+  CHECK(of_gust.window->until == 1.65);
+  CHECK_FALSE(other.applied(0).window);
+  CHECK(other.run(11).effects.size() == 3);
+
+  // and stays in its range: half as strong again, and as far off as it may be
+  CHECK(point.with(0, 9).value()[0] == 6);
+  CHECK(point.with(2, 0).value()[2] == Approx(0.06));
+  CHECK(point.with(5, 9).value()[5] == Approx(1.5));
+  CHECK(point.with(8, 0).value()[8] == Approx(0.3));
+  CHECK(point.with(9, 9).value()[9] == Approx(1.7));
+  CHECK(point.step(2) == Approx(0.016));
+  CHECK(point.step(5) == Approx(0.2));
+  CHECK(point.step(9) == Approx(0.08));
+}
+
+TEST_CASE("effect point: what is not looked for is no number of it") {
+  Effect leak = named("leak", {{"", 0, 0, 40}});
+  leak.place = Vector3<double>(0, 0, 0);  // without a tolerance
+  leak.window = TimeWindow{0, 1};
+  EffectPoint point;
+  point.add(leak, 0, {0, numbers({10})});
+  CHECK(point.size() == 1);
+  CHECK_FALSE(point.applied(0).place);
+  CHECK_FALSE(point.applied(0).window);
+  CHECK_THROWS_WITH(point.add(leak, 0, {0, numbers({1, 2})}), decant_test::contains("each component"));
+  // an end only
+  leak.window_tolerance = 0.3;
+  leak.window->from = -std::numeric_limits<double>::infinity();
+  EffectPoint ends;
+  ends.add(leak, 0, {0, numbers({10})});
+  CHECK(ends.value() == numbers({10, 1}));
+  CHECK(ends.range(1).second == Approx(1.3));
+  CHECK(ends.applied(0).window->until == 1);
+}
+
+TEST_CASE("refinement: one step finds what is linear, in several recordings together") {
+  const Effect drag = named("drag", {{"", 0, 0, 4}}), pull = named("pull", {{"", 0, -1, 1}});
+  EffectPoint point;
+  point.add(drag, 0, {0, numbers({1})});
+  point.add(pull, 1, {1, numbers({0.2})});
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal(0, 1);
+  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
+  };
+  std::vector<NuisanceSpace> spaces;
+  std::vector<RefinementView> views;
+  std::vector<Eigen::VectorXd> features;
+  const Eigen::VectorXd truth = numbers({1.4, 0.1});
+  for (int recording = 0; recording < 2; ++recording) {
+    NuisanceSample sample;
+    sample.baseline = 0.1 * draw(40, 4);
+    sample.draws = 0.1 * draw(40, 12);
+    spaces.emplace_back(sample);
+  }
+  for (const NuisanceSpace& space : spaces) {
+    RefinementView view{&space, draw(40, 1), draw(40, 2)};
+    features.push_back(view.middle + view.slope * (truth - point.value()));
+    views.push_back(view);
+  }
+  const Eigen::VectorXd found = point.value() + refinement(point, views, features);
+  // a hundredth of the curvature holds it where it is
+  CHECK((found - truth).cwiseAbs().maxCoeff() < 0.02 * (truth - point.value()).cwiseAbs().maxCoeff());
+  // no farther than two steps at once
+  features[0] += views[0].slope * numbers({100, 0});
+  features[1] += views[1].slope * numbers({100, 0});
+  CHECK(refinement(point, views, features)[0] == Approx(2 * point.step(0)));
+}
