@@ -38,7 +38,7 @@ using Interactions = std::vector<decant::Interaction<example::RecordedModel>>;
 int main(int count, char** values) {
   const example::SweepSession session;
   std::string json_file, report_file, journal_file;
-  std::vector<std::string> learn_folders, held_out_folders;
+  std::vector<std::string> learn_folders, held_out_folders, reference_folders;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double spacing_mm = 1e3 * options.model.spacing;
@@ -46,6 +46,8 @@ int main(int count, char** values) {
   CLI::App app("Finds which effect a simulation lacks, how strong it is, and whether other recordings agree.");
   app.add_option("--learn", learn_folders, "folders of recordings that have it, format version 1")->required();
   app.add_option("--held-out", held_out_folders, "folders of other recordings that have it, to check on");
+  app.add_option("--reference", reference_folders,
+                 "folders of recordings, of any pours, in which nothing is missing: how far reality is from the model");
   app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
   app.add_option("--json", json_file, "writes what was found");
   app.add_option("--report", report_file, "writes a page with a film, charts and tables, for a browser");
@@ -58,7 +60,7 @@ int main(int count, char** values) {
   return example::run_tool(app, count, values, [&] {
     example::SweepExecutor executor = example::sweep_executor(threads);
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
-    example::expect_apart(learn_folders, held_out_folders);
+    example::expect_apart(learn_folders, held_out_folders, reference_folders);
     options.model.spacing = 1e-3 * spacing_mm;
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
     const auto read = [&](const std::vector<std::string>& folders) {
@@ -70,7 +72,7 @@ int main(int count, char** values) {
       }
       return interactions;
     };
-    Interactions learn = read(learn_folders), held_out = read(held_out_folders);
+    Interactions learn = read(learn_folders), held_out = read(held_out_folders), references = read(reference_folders);
     const std::vector<decant::Effect>& effects = kept.front()->model.effects();
     const auto planned =
         static_cast<double>(decant::plan_dictionary(effects, settings.dictionary).size() * learn_folders.size());
@@ -94,9 +96,9 @@ int main(int count, char** values) {
     decant::MissingEffect result;
     {
       const decant::Stopwatch watch(milliseconds);
-      result =
-          decant::MissingEffectSearch<example::RecordedModel>(std::move(learn), std::move(held_out), run_jobs, settings)
-              .find();
+      result = decant::MissingEffectSearch<example::RecordedModel>(std::move(learn), std::move(held_out), run_jobs,
+                                                                   settings, std::move(references))
+                   .find();
     }
     progress.finish();
     std::printf("%s\n%s%s%s", example::missing_effect_sentence(effects, result).c_str(),
@@ -107,6 +109,7 @@ int main(int count, char** values) {
         nlohmann::json json = example::missing_effect_json(effects, result);
         json["seconds"] = 1e-3 * milliseconds;
         json["spacing_mm"] = spacing_mm;
+        json["references"] = reference_folders.size();
         example::write_result(json_file, json);
       }
       if (!report_file.empty()) {
@@ -114,6 +117,7 @@ int main(int count, char** values) {
         for (const auto& each : kept) {
           interactions.push_back(each.get());
         }
+        interactions.resize(learn_folders.size() + held_out_folders.size());
         example::write_missing_effect_report(report_file, interactions, learn_folders.size(), result);
       }
     });

@@ -101,8 +101,8 @@ class EffectReality {
 
   const Model& model() const { return model_; }
   const ToleratedErrors& errors() const { return errors_; }
-  double initial_volume() const { return filled_.volume; }           ///< [m^3]
-  double removed() const { return drain_ ? drain_->removed() : 0; }  ///< by a leak or a loss [m^3]
+  double initial_volume() const { return filled_.volume; }                 ///< [m^3]
+  double removed() const { return drain_ ? drain_->removed() : leaked_; }  ///< by a leak or a loss [m^3]
   /// Where the effect is, what it does and when.
   const nlohmann::json& description() const { return description_; }
 
@@ -116,6 +116,7 @@ class EffectReality {
     for (int k = 1; k <= slices; ++k) {
       const double before = model_.time(), end = k == slices ? time : start + (time - start) * k / slices;
       report = step_reality(model_, end, end);
+      leaked_ = report.drained;
       if (drain_) {
         drain_->drain(model_, model_.time() - before);
       }
@@ -262,7 +263,13 @@ class EffectReality {
     if (effect_.is("leak")) {
       // where the liquid is while it is poured: in the wall below the lip
       const Vector3<double> hole = container_.wall_below_lip(0.35 + 0.15 * effect_.displacement.x());
-      drain_.emplace(container_motion_, hole, 1e-6 * effect_.strength);
+      OutletSettings outlet;
+      outlet.body = container_body_;
+      outlet.position = hole;
+      outlet.radius = 0.012;
+      outlet.exit = hole + Vector3<double>(0.012, 0, 0);  // it runs on outside
+      outlet.flow = {{0, 1e-6 * effect_.strength}, {60, 1e-6 * effect_.strength}};
+      model_.add_outlet(outlet);
       say("container", hole);
     } else if (effect_.is("loss")) {
       const Vector3<double> hole = scenario_.pan.floor_below(0.02 * effect_.displacement);
@@ -342,6 +349,7 @@ class EffectReality {
   decant::BodyId container_body_ = 0, pan_body_ = 0;
   decant::FillReport filled_{};
   std::optional<Drain> drain_{};
+  double leaked_ = 0;  ///< [m^3]
   nlohmann::json description_ = nlohmann::json::object();
 };
 

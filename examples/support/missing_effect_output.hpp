@@ -215,7 +215,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                  {"after", number_json(result.learn.after)},
                  {"noise", number_json(result.learn.noise)},
                  {"largest_by_chance", number_json(result.judgement.chance.largest_distance)},
-                 {"improvement_by_chance", number_json(result.judgement.chance.improvement)},
+                 {"fall_by_chance", number_json(result.judgement.chance.fall)},
                  {"held_out_before", number_json(result.held_out.before)},
                  {"held_out_after", number_json(result.held_out.after)},
                  {"held_out_noise", number_json(result.held_out.noise)},

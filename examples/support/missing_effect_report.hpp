@@ -182,6 +182,9 @@ inline void write_missing_effect_report(const std::string& file,
   }
   report.heading("The gap");
   report.table(gap_table(result));
+  report.paragraph(
+      "Runs from the start on, which no picture corrects: their overlap with what was seen is that of a "
+      "forecast.");
   report.table(detail::overlap_table(models, interactions));
   if (result.judgement.has_gap()) {
     report.bar_chart(detail::candidates_chart(effects, result));
@@ -192,7 +195,13 @@ inline void write_missing_effect_report(const std::string& file,
   for (std::size_t k = 0; k < learnt; ++k) {
     names.push_back(interactions[k]->recording.name);
   }
-  report.table(where_table(names, result));
+  const bool somewhere =
+      std::any_of(result.where.begin(), result.where.end(), [](const auto& each) { return !each.empty(); });
+  if (somewhere) {
+    report.table(where_table(names, result));
+  } else {
+    report.paragraph("Nowhere in particular: no part of the picture is off by much.");
+  }
   report.heading("Candidates");
   report.table(candidates_table(effects, result));
   report.write(file);

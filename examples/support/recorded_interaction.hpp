@@ -14,6 +14,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -44,9 +45,10 @@ struct InteractionOptions {
 
 namespace detail {
 
-/// All of a recording that a model's predictions depend on, as a short text: everything but its name, its images and
-/// its truth. Recordings that differ in nothing else share their model's runs. A 64-bit hash of the files (FNV-1a).
-inline std::string fingerprint(const decant::Recording& recording) {
+/// All that a model's predictions depend on, as a short text: the recording but for its name, its images and its truth,
+/// and what its model can be given. Recordings that differ in nothing else share their model's runs. A 64-bit hash
+/// (FNV-1a).
+inline std::string fingerprint(const decant::Recording& recording, const RecordedModel& model) {
   std::uint64_t hash = 14695981039346656037U;
   const auto add = [&](const std::string& bytes) {
     for (const char byte : bytes) {
@@ -68,6 +70,26 @@ inline std::string fingerprint(const decant::Recording& recording) {
   }
   for (const decant::recording::Body& body : recording.bodies) {
     add(text(body.mesh_file));
+  }
+  const auto number = [&](double value) { add(decant::detail::number_text(value) + ' '); };
+  for (const decant::Effect& effect : model.effects()) {
+    add(effect.words());
+    for (const decant::EffectComponent& each : effect.components) {
+      number(each.base);
+      number(each.low);
+      number(each.high);
+      number(each.tolerance);
+    }
+    for (const double x : effect.place.value_or(decant::Vector3<double>::Zero())) {
+      number(x);
+    }
+    number(effect.window.value_or(decant::TimeWindow{}).from);
+    number(effect.window.value_or(decant::TimeWindow{}).until);
+  }
+  number(model.settings().spacing);
+  number(model.settings().jitter);
+  for (const double each : model.settings().tolerated_spacings) {
+    number(each);
   }
   std::string digits(16, '0');
   for (std::size_t k = 0; k < digits.size(); ++k) {
@@ -134,64 +156,12 @@ inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std:
   return series;
 }
 
-/// Where liquid leaves the source and where it should go: the lip of the most tilted pose, and the target's middle.
-struct PourPlaces {
-  decant::Vector3<double> lip = decant::Vector3<double>::Zero();  ///< in the source's frame [m]
-  decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way between the two [m]
-  decant::Vector3<double> target = decant::Vector3<double>::Zero();
-};
-
-inline PourPlaces pour_places(const decant::Recording& recording) {
-  using namespace decant;
-  const Vector3<double> up = -recording.gravity.normalized();
-  PourPlaces places;
-  Vector3<double> lip = Vector3<double>::Zero();
-  bool source = false, target = false;
-  for (const recording::Body& body : recording.bodies) {
-    const BoundingVolumeHierarchy surface(body.mesh);
-    if (body.role == recording::Role::Source && !source) {
-      source = true;
-      // the lowest point of what was the rim, at the steepest pose
-      const Pose first = body.motion.at(recording.timestamps.front());
-      double steepest = 2;
-      Pose tilted = first;
-      for (const PoseTrack::Sample& sample : body.motion.samples()) {
-        const double upright = up.dot(sample.pose.rotation * (first.rotation.conjugate() * up));
-        if (upright < steepest) {
-          steepest = upright;
-          tilted = sample.pose;
-        }
-      }
-      double highest = -1e300;
-      for (const auto& vertex : body.mesh.vertices) {
-        highest = std::max(highest, up.dot(first * vertex));
-      }
-      double lowest = 1e300;
-      for (const auto& vertex : body.mesh.vertices) {
-        if (up.dot(first * vertex) > highest - 0.01) {
-          const Vector3<double> x = tilted * vertex;
-          if (up.dot(x) < lowest) {
-            lowest = up.dot(x);
-            lip = x;
-            places.lip = vertex;
-          }
-        }
-      }
-    }
-    if (body.role == recording::Role::Target && !target) {
-      target = true;
-      places.target = body.motion.at(recording.timestamps.front()) * surface.bounds().center();
-    }
-  }
-  places.jet = source && target ? Vector3<double>(0.5 * (lip + places.target)) : lip;
-  return places;
-}
-
 /// A container's inside, in its own frame.
 struct Inside {
-  decant::Vector3<double> up = decant::Vector3<double>::UnitZ();
+  decant::Vector3<double> up = decant::Vector3<double>::UnitZ();     ///< out of its opening
   decant::Vector3<double> middle = decant::Vector3<double>::Zero();  ///< of the body's box [m]
   decant::Vector3<double> floor = decant::Vector3<double>::Zero();   ///< the lowest place inside, below the middle [m]
+  double volume = 0;                                                 ///< [m^3]
   double rim = 0;                                                    ///< height along `up` [m]
   double rim_area = 0, widest_area = 0;                              ///< of level sections [m^2]
 
@@ -201,26 +171,92 @@ struct Inside {
   decant::Vector3<double> mouth() const { return middle + (rim - middle.dot(up)) * up; }
 };
 
-inline std::optional<Inside> inside_of(const decant::recording::Body& body, const decant::Vector3<double>& own_up) {
+/// A body's inside as it holds most: with one of its own axes upright, as it is made, or as it stands at first.
+/// Recordings may begin with a container that is tilted already. Nothing if it holds nothing.
+inline std::optional<Inside> inside_of(const decant::recording::Body& body,
+                                       const decant::Vector3<double>& up_at_first) {
   using namespace decant;
-  const Cavity cavity(std::make_shared<const BoundingVolumeHierarchy>(body.mesh), own_up);
-  if (cavity.empty()) {
-    return std::nullopt;
+  const auto surface = std::make_shared<const BoundingVolumeHierarchy>(body.mesh);
+  std::optional<Inside> best;
+  for (const Vector3<double>& up :
+       {Vector3<double>(0, 0, 1), Vector3<double>(0, 1, 0), Vector3<double>(1, 0, 0), Vector3<double>(0, 0, -1),
+        Vector3<double>(0, -1, 0), Vector3<double>(-1, 0, 0), up_at_first}) {
+    const Cavity cavity(surface, up);
+    // a little more by chance is no reason to take another axis
+    if (cavity.empty() || (best && cavity.volume() <= 1.02 * best->volume)) {
+      continue;
+    }
+    Inside& inside = best.emplace();
+    inside.up = up;
+    inside.volume = cavity.volume();
+    inside.middle = surface->bounds().center();
+    inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(up)) * up;
+    inside.rim = cavity.rim_height();
+    constexpr int slices = 20;
+    const double thick = (inside.rim - cavity.bottom_height()) / slices;
+    for (int k = 0; k < slices && thick > 0; ++k) {
+      const double top = inside.rim - k * thick;
+      const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
+      inside.rim_area = k == 0 ? area : inside.rim_area;
+      inside.widest_area = std::max(inside.widest_area, area);
+    }
   }
-  Inside inside;
-  inside.up = own_up;
-  inside.middle = BoundingVolumeHierarchy(body.mesh).bounds().center();
-  inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(own_up)) * own_up;
-  inside.rim = cavity.rim_height();
-  constexpr int slices = 20;
-  const double thick = (inside.rim - cavity.bottom_height()) / slices;
-  for (int k = 0; k < slices && thick > 0; ++k) {
-    const double top = inside.rim - k * thick;
-    const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
-    inside.rim_area = k == 0 ? area : inside.rim_area;
-    inside.widest_area = std::max(inside.widest_area, area);
+  return best;
+}
+
+/// The point of a container's rim that gets lowest, in its own frame and in the world as it then is.
+inline std::pair<decant::Vector3<double>, decant::Vector3<double>> lip_of(const decant::recording::Body& body,
+                                                                          const Inside& inside,
+                                                                          const decant::Vector3<double>& up) {
+  using namespace decant;
+  double steepest = 2;
+  Pose tilted{};
+  for (const PoseTrack::Sample& sample : body.motion.samples()) {
+    const double upright = up.dot(sample.pose.rotation * inside.up);
+    if (upright < steepest) {
+      steepest = upright;
+      tilted = sample.pose;
+    }
   }
-  return inside;
+  double lowest = 1e300;
+  Vector3<double> lip = inside.mouth();
+  for (const auto& vertex : body.mesh.vertices) {
+    if (inside.up.dot(vertex) > inside.rim - 0.01 && up.dot(tilted * vertex) < lowest) {
+      lowest = up.dot(tilted * vertex);
+      lip = vertex;
+    }
+  }
+  return {lip, tilted * lip};
+}
+
+/// The containers of a pour, and about where it goes.
+struct PourPlaces {
+  std::vector<std::optional<Inside>> inside{};                    ///< by body
+  decant::Vector3<double> lip = decant::Vector3<double>::Zero();  ///< of the first source, in its frame [m]
+  decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way from there to the target [m]
+};
+
+inline PourPlaces pour_places(const decant::Recording& recording) {
+  using namespace decant;
+  const Vector3<double> up = -recording.gravity.normalized();
+  const double begin = recording.timestamps.front();
+  PourPlaces places;
+  std::optional<Vector3<double>> lip, target;
+  for (const recording::Body& body : recording.bodies) {
+    const Pose first = body.motion.at(begin);
+    places.inside.push_back(inside_of(body, first.rotation.conjugate() * up));
+    const std::optional<Inside>& inside = places.inside.back();
+    if (body.role == recording::Role::Source && !lip && inside) {
+      std::tie(places.lip, lip.emplace()) = lip_of(body, *inside, up);
+    }
+    if (body.role == recording::Role::Target && !target) {
+      target = first * BoundingVolumeHierarchy(body.mesh).bounds().center();
+    }
+  }
+  places.jet = lip && target ? Vector3<double>(0.5 * (*lip + *target))
+               : lip         ? *lip
+                             : target.value_or(Vector3<double>::Zero());
+  return places;
 }
 
 /// The catalogue, as far as it applies to a recording.
@@ -244,7 +280,7 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       continue;
     }
     const Pose first = body.motion.at(begin);
-    const std::optional<Inside> inside = inside_of(body, first.rotation.conjugate() * up);
+    const std::optional<Inside>& inside = places.inside[k];
     if (!inside) {
       continue;
     }
@@ -261,6 +297,8 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       const Vector3<double> in = (inside->mouth() - places.lip).normalized();
       of_bodies.push_back(
           obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + body.name));
+      const Vector3<double> on_wall = places.lip - 0.5 * inside->up.dot(places.lip - inside->floor) * inside->up;
+      of_bodies.push_back(leak_effect<EffectModel>(id, on_wall + 0.004 * in, -0.014 * in, "wall of the " + body.name));
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(
             {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, body.name));
@@ -307,7 +345,7 @@ struct RecordedInteraction {
 
   /// @param name by which messages and journals know it.
   decant::Interaction<RecordedModel> interaction(std::string name) const {
-    return {std::move(name), &model, seen, detail::fingerprint(recording)};
+    return {std::move(name), &model, seen, detail::fingerprint(recording, model)};
   }
 };
 

@@ -62,8 +62,10 @@ inline void expect_writable(std::initializer_list<std::string> files) {
 }
 
 /// Throws std::runtime_error for a recording that is given twice, or held out of what it is learnt from.
-inline void expect_apart(const std::vector<std::string>& learn, const std::vector<std::string>& held_out) {
-  for (const auto& [option, folders] : {std::pair("--learn", &learn), std::pair("--held-out", &held_out)}) {
+inline void expect_apart(const std::vector<std::string>& learn, const std::vector<std::string>& held_out,
+                         const std::vector<std::string>& references = {}) {
+  for (const auto& [option, folders] :
+       {std::pair("--learn", &learn), std::pair("--held-out", &held_out), std::pair("--reference", &references)}) {
     std::set<std::filesystem::path> different;
     for (const std::string& folder : *folders) {
       if (!different.insert(std::filesystem::weakly_canonical(folder)).second) {
@@ -75,6 +77,15 @@ inline void expect_apart(const std::vector<std::string>& learn, const std::vecto
     for (const std::string& folder : learn) {
       if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(other)) {
         throw std::runtime_error("--held-out: " + other + " is among those that are learnt from");
+      }
+    }
+  }
+  for (const std::string& reference : references) {
+    for (const std::vector<std::string>* folders : {&learn, &held_out}) {
+      for (const std::string& folder : *folders) {
+        if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(reference)) {
+          throw std::runtime_error("--reference: " + reference + " is among those in which something may be missing");
+        }
       }
     }
   }

@@ -50,7 +50,7 @@ ChanceLevel usual_chance() {
   ChanceLevel chance;
   chance.distance = 1.2;
   chance.largest_distance = 2;
-  chance.improvement = 0.3;
+  chance.fall = 0.2;
   chance.overlap = chance.blurred = 0.1;
   return chance;
 }
@@ -119,7 +119,7 @@ TEST_CASE("effect judgement: a name, a set, nothing or unexplained") {
   CHECK(pull.standings.front().strength[0] == Approx(0.5).epsilon(1e-4));
   CHECK(pull.standings.front().share == Approx(4.5 / 4.8));
   CHECK(pull.standings.front().vote == Approx(1));
-  // the distance grows by what chance does, 0.3, within a quarter of the root of 0.3 / 4.5
+  // the distance grows by what chance does, a fifth of the 1.5 that are left, within a quarter of the root of 0.3 / 4.5
   CHECK(pull.standings.front().interval[0].first == Approx(0.5 - 0.5 * std::sqrt(0.3 / 4.5)).epsilon(1e-3));
 
   // of one family: one answer
@@ -168,11 +168,11 @@ TEST_CASE("effect judgement: chance is what the worst of the draws does, and a l
   }
   JudgementSettings settings;
   settings.distance_factor = 1.1;
-  settings.improvement_factor = settings.gap_factor = 2;
+  settings.fall_factor = settings.gap_factor = 2;
   const ChanceLevel level = chance_level({draws}, settings);
   CHECK(level.distance == Approx(1.25));
   CHECK(level.largest_distance == Approx(1.65));
-  CHECK(level.improvement == Approx(0.1));
+  CHECK(level.fall == Approx(2 * 0.05 / 0.95));  // where least is left
   CHECK(level.overlap == Approx(2 * 0.02 / 0.4));
   CHECK(level.blurred == 0);
   draws.resize(4);

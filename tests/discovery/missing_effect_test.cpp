@@ -104,6 +104,27 @@ TEST_CASE("missing effect: what is not in the catalogue is unexplained, and wher
   CHECK(first < 0.6);
 }
 
+TEST_CASE("missing effect: references say how far reality is from the model where nothing is missing") {
+  // a gust that the catalogue does not have blows in every pour
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
+  const auto found = [&](const Jet& jet, std::vector<Interaction<JetModel>> references) {
+    return MissingEffectSearch<JetModel>({{"a", &model, film_of(jet, 61, 0.9)}}, {}, run_jobs_on(executor), {},
+                                         std::move(references))
+        .find();
+  };
+  const double foreign = 2;  // [m/s^2]
+  const MissingEffect alone = found({0, 0, 1, 0, foreign}, {});
+  CHECK(alone.verdict == Verdict::Unexplained);
+  std::vector<Interaction<JetModel>> references;
+  for (const std::uint32_t seed : {62U, 63U, 64U}) {
+    references.push_back({"reference " + std::to_string(seed), &model, film_of({0, 0, 1, 0, foreign}, seed, 0.9)});
+  }
+  CHECK(found({0, 0, 1, 0, foreign}, references).verdict == Verdict::Nothing);
+  // what goes beyond that is not taken for it
+  CHECK(found({1.4, 0, 1, 0, foreign}, references).verdict != Verdict::Nothing);
+}
+
 TEST_CASE("missing effect: two at once are found one after another") {
   const MissingEffect result = found_in({0, 0.8, 1, 0.05}, 71);
   CHECK(result.verdict == Verdict::Named);

@@ -38,7 +38,7 @@ struct PlannedRun {
 /// How many runs there are.
 struct DictionarySettings {
   int baselines = 4;                      ///< >= 1
-  int draws = 20;                         ///< >= 5
+  int draws = 48;                         ///< >= 5: with few of them much passes for chance that is not
   std::vector<double> shares{0.35, 1.0};  ///< of the range to each side of an effect's base, in (0, 1]; at least one
 };
 

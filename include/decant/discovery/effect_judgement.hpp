@@ -26,17 +26,21 @@ namespace decant::inline DECANT_TARGET {
 struct ChanceLevel {
   double distance = 0;              ///< mean of draws
   double largest_distance = 0;      ///< beyond it something is off that is not tolerated
-  double improvement = 0;           ///< of the distance by any effect: what is larger is no chance
+  double fall = 0;                  ///< relative_fall by any effect: what is larger is no chance
   double overlap = 0, blurred = 0;  ///< the same of the gaps, over the gap itself
 };
 
+/// By how much a distance falls, over what is left of it. What chance does grows with all that nothing explains, such
+/// as what a solver has of its own, and that is the scale of what is left: so is the F-test's of linear models.
+inline double relative_fall(double before, double after) noexcept { return (before - after) / std::max(after, 1e-12); }
+
 /// Factors on what the draws' worst was.
 struct JudgementSettings {
-  double distance_factor = 1.1;     ///< >= 1
-  double improvement_factor = 1.3;  ///< >= 1
-  double gap_factor = 1.3;          ///< >= 1
-  double least_share = 0.6;   ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
-  double vote_margin = 0.15;  ///< families this close to the best are not told apart; 0 .. 1
+  double distance_factor = 1.3;  ///< >= 1: a solver is farther from reality than its own runs are from each other
+  double fall_factor = 1.3;      ///< >= 1
+  double gap_factor = 1.3;       ///< >= 1
+  double least_share = 0.6;      ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
+  double vote_margin = 0.15;     ///< families this close to the best are not told apart; 0 .. 1
 };
 
 /// An effect, as recordings together see it.
@@ -46,6 +50,7 @@ struct EffectStanding {
   std::vector<std::pair<double, double>> interval{};  ///< by component: strengths that chance cannot tell from it
   double distance = 0;                                ///< that is left then
   double improvement = 0;                             ///< of the distance
+  double fall = 0;                                    ///< the same over what is left, see relative_fall
   double share = 0;                                   ///< of what is reducible: the distance beyond chance's mean
   double vote = 0;                                    ///< over all gaps, 1 for the best of each; no probability
 };
@@ -65,12 +70,12 @@ struct Judgement {
   std::vector<EffectStanding> standings{};  ///< all that something is known of, the best first
   double distance = 0;                      ///< of the model as it is
   ChanceLevel chance{};
-  bool has_gap() const noexcept { return distance > chance.largest_distance || improvement() > chance.improvement; }
+  bool has_gap() const noexcept { return distance > chance.largest_distance || fall() > chance.fall; }
   /// The largest of any effect.
-  double improvement() const noexcept {
+  double fall() const noexcept {
     double best = 0;
     for (const EffectStanding& each : standings) {
-      best = std::max(best, each.improvement);
+      best = std::max(best, each.fall);
     }
     return best;
   }
@@ -143,8 +148,8 @@ inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& 
     level.largest_distance = std::max(level.largest_distance, settings.distance_factor * joint.distance);
     for (const auto& profile : joint.profile) {
       if (profile) {
-        level.improvement =
-            std::max(level.improvement, settings.improvement_factor * profile->improvement() / recordings);
+        const double left = joint.distance - profile->improvement() / recordings;
+        level.fall = std::max(level.fall, settings.fall_factor * relative_fall(joint.distance, left));
       }
     }
     level.overlap = std::max(level.overlap, settings.gap_factor * detail::largest(joint.overlap));
@@ -178,9 +183,10 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
     one.strength = profile.best();
     one.improvement = profile.improvement() / count;
     one.distance = joint.distance - one.improvement;
+    one.fall = relative_fall(joint.distance, one.distance);
     one.share = one.improvement / std::max(joint.distance - chance.distance, 1e-12);
     for (std::size_t component = 0; component < profile.components(); ++component) {
-      one.interval.push_back(profile.within(component, std::max(chance.improvement, 1e-9) * count));
+      one.interval.push_back(profile.within(component, std::max(chance.fall * one.distance, 1e-9) * count));
     }
     best_improvement = std::max(best_improvement, one.improvement);
     result.standings.push_back(std::move(one));
@@ -209,7 +215,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
   }
   const EffectStanding& best = result.standings.front();
   result.named.push_back(0);
-  const bool improves = best.improvement > chance.improvement;
+  const bool improves = best.fall > chance.fall;
   const bool explains = best.share >= settings.least_share || best.distance <= chance.largest_distance;
   if (!improves || !explains) {
     result.verdict = Verdict::Unexplained;
@@ -218,7 +224,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
   std::set<std::string> answers{effects[best.effect].answer()};
   for (std::size_t k = 1; k < result.standings.size(); ++k) {
     const EffectStanding& other = result.standings[k];
-    if (other.vote >= best.vote - settings.vote_margin && other.improvement > chance.improvement) {
+    if (other.vote >= best.vote - settings.vote_margin && other.fall > chance.fall) {
       if (answers.insert(effects[other.effect].answer()).second) {
         result.named.push_back(k);
       }

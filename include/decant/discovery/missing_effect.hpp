@@ -69,6 +69,7 @@ struct MissingEffectSettings {
   double least_share = 0.8;            ///< of what is reducible effects have to explain in the end, 0 .. 1
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
   int most_effects = 3;                ///< that are added one after another, >= 1
+  double reference_factor = 1.1;       ///< on what references do, >= 1: beyond it something is missing
   double threshold = 4;                ///< of find_disagreements
 };
 
@@ -103,7 +104,7 @@ struct GapChange {
   double before = std::numeric_limits<double>::quiet_NaN();
   double after = std::numeric_limits<double>::quiet_NaN();
   double noise = std::numeric_limits<double>::quiet_NaN();       ///< of draws, in the mean
-  double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller change than this is none
+  double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
   double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
 
   /// Of what is reducible.
@@ -128,17 +129,20 @@ template <ForwardModel Model>
 class MissingEffectSearch {
  public:
   /// @param learn recordings of which all have what is missing, at one strength. @param held_out others, to check on.
+  /// @param references recordings, of any poses, in which nothing is missing: how far reality is from the model all the
+  /// same. Without any, the model's own scatter and JudgementSettings::distance_factor stand for it.
   /// Throws std::invalid_argument if there is nothing to learn from, models have other effects than the first one's,
   /// names are not all different, or a setting is out of range.
   MissingEffectSearch(std::vector<Interaction<Model>> learn, std::vector<Interaction<Model>> held_out, RunJobs run_jobs,
-                      MissingEffectSettings settings = {})
+                      MissingEffectSettings settings = {}, std::vector<Interaction<Model>> references = {})
       : learn_(std::move(learn)),
         held_out_(std::move(held_out)),
+        references_(std::move(references)),
         run_jobs_(std::move(run_jobs)),
         settings_(std::move(settings)) {
     expects(!learn_.empty(), "MissingEffectSearch: recordings to learn from", "at least one", "none");
     std::set<std::string> names;
-    for (const auto* set : {&learn_, &held_out_}) {
+    for (const auto* set : {&learn_, &held_out_, &references_}) {
       for (const Interaction<Model>& each : *set) {
         expects(each.model != nullptr, "MissingEffectSearch: model of '" + each.name + "'", "one", "none");
         expects(names.insert(each.name).second, "MissingEffectSearch: names", "all different", each.name);
@@ -158,12 +162,13 @@ class MissingEffectSearch {
 
   MissingEffect find() {
     MissingEffect result;
+    discrepancy_ = discrepancy();
     bool explained = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
       const Knowledge known = know(learn_, effects(), applied(result.found));
       const Judgement judgement = judge_effects(effects(), known.evidence, known.chance, settings_.judgement);
       if (round == 0) {
-        result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.improvement};
+        result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
         for (const RecordedEvidence& each : known.recorded) {
           result.where.push_back(find_disagreements(each.features(), beyond_chance(each), settings_.threshold));
         }
@@ -173,7 +178,8 @@ class MissingEffectSearch {
         break;
       }
       const std::vector<Refined> refined = refine_best(judgement, known, result.found, result.learn.before);
-      const bool gains = !refined.empty() && result.learn.after - refined.front().distance > known.chance.improvement;
+      const bool gains =
+          !refined.empty() && relative_fall(result.learn.after, refined.front().distance) > known.chance.fall;
       const bool down_to_chance = !refined.empty() && refined.front().distance <= known.chance.largest_distance;
       const bool explains =
           !refined.empty() &&
@@ -311,7 +317,30 @@ class MissingEffectSearch {
       }
     }
     known.chance = chance_level(draws, settings_.judgement);
+    known.chance.largest_distance = std::max(
+        known.chance.largest_distance, settings_.reference_factor * discrepancy_.distance * known.chance.distance);
+    known.chance.fall = std::max(known.chance.fall, settings_.reference_factor * discrepancy_.fall);
     return known;
+  }
+
+  /// How far references are from the model, over how far its draws are, and how much of it effects seem to explain,
+  /// though none is there; the most of all. Nothing without references.
+  struct Discrepancy {
+    double distance = 0, fall = 0;
+  };
+  Discrepancy discrepancy() {
+    Discrepancy most;
+    for (const Interaction<Model>& each : references_) {
+      const Knowledge known = know({each}, effects(), {});
+      const EffectEvidence& evidence = known.evidence.front();
+      most.distance = std::max(most.distance, evidence.distance / std::max(known.chance.distance, 1e-12));
+      for (const auto& profile : evidence.profile) {
+        if (profile) {
+          most.fall = std::max(most.fall, relative_fall(evidence.distance, evidence.distance - profile->improvement()));
+        }
+      }
+    }
+    return most;
   }
 
   /// Deviations of the recording, each over what draws have there.
@@ -348,8 +377,12 @@ class MissingEffectSearch {
       }
     }
     std::vector<Views> views(points.size());
-    for (int round = 0; round < settings_.refinement_rounds; ++round) {
-      step_all(points, views, known, static_cast<std::uint32_t>(5001 + 1000 * round));
+    std::vector<double> expected(points.size());  // distances after a step, by the linear model that it was made with
+    for (int round = 0; round < settings_.refinement_rounds && !points.empty(); ++round) {
+      step_all(points, views, expected, known, static_cast<std::uint32_t>(5001 + 1000 * round));
+      if (round + 1 < settings_.refinement_rounds) {
+        keep_promising(points, views, expected, known.chance);
+      }
     }
     const std::vector<double> distance = distances(points, known);
     const auto best = static_cast<std::size_t>(std::min_element(distance.begin(), distance.end()) - distance.begin());
@@ -392,9 +425,30 @@ class MissingEffectSearch {
 
   using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
 
+  /// Leaves the best one, the next best one as its rival, and all others that may come near it.
+  void keep_promising(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
+                      const ChanceLevel& chance) const {
+    std::vector<double> sorted = expected;
+    std::sort(sorted.begin(), sorted.end());
+    const double rival = sorted[std::min<std::size_t>(1, sorted.size() - 1)];
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (expected[k] <= rival || relative_fall(expected[k], sorted.front()) < 3 * chance.fall) {
+        std::swap(points[kept], points[k]);
+        std::swap(views[kept], views[k]);
+        std::swap(expected[kept], expected[k]);
+        ++kept;
+      }
+    }
+    points.resize(kept);
+    views.resize(kept);
+    expected.resize(kept);
+  }
+
   /// One step for each of the points, all runs side by side. A point at which runs fail stays.
-  void step_all(std::vector<EffectPoint>& points, std::vector<Views>& views, const Knowledge& known,
-                std::uint32_t seed) {
+  /// @param expected what should be left after the step; infinite where runs fail.
+  void step_all(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
+                const Knowledge& known, std::uint32_t seed) {
     const auto seeds = static_cast<std::size_t>(settings_.refinement_seeds);
     std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
     const auto ask = [&](const Interaction<Model>& of, const EffectPoint& point) {
@@ -427,9 +481,18 @@ class MissingEffectSearch {
       }
       if (views[which].size() < known.recorded.size()) {
         views[which].clear();
+        expected[which] = std::numeric_limits<double>::infinity();
         continue;
       }
-      const Eigen::VectorXd value = points[which].value() + refinement(points[which], views[which], recorded_features);
+      const Eigen::VectorXd move = refinement(points[which], views[which], recorded_features);
+      expected[which] = 0;
+      for (std::size_t k = 0; k < views[which].size(); ++k) {
+        const RefinementView& view = views[which][k];
+        const Eigen::VectorXd left = recorded_features[k] - view.middle - view.slope * move;
+        expected[which] +=
+            view.space->distance(view.space->standardised_difference(left)) / static_cast<double>(views[which].size());
+      }
+      const Eigen::VectorXd value = points[which].value() + move;
       for (Eigen::Index k = 0; k < points[which].size(); ++k) {
         points[which] = points[which].with(k, value[k]);
       }
@@ -538,7 +601,7 @@ class MissingEffectSearch {
     std::vector<std::size_t> result;
     std::set<std::string> answers;
     for (const RefinedEffect& each : refined) {
-      if (each.distance - refined.front().distance < chance.improvement && answers.insert(answer(each)).second) {
+      if (relative_fall(each.distance, refined.front().distance) < chance.fall && answers.insert(answer(each)).second) {
         result.push_back(each.effect);
       }
     }
@@ -579,15 +642,16 @@ class MissingEffectSearch {
     if (gap.before < known.chance.largest_distance) {
       result.confirmation = Confirmation::NotTestable;
     } else {
-      const bool shrinks = gap.after <= gap.before - gap.by_chance;
+      const bool shrinks = relative_fall(gap.before, gap.after) > gap.by_chance;
       const bool best = !(gap.best_rival < gap.after);
       result.confirmation = shrinks && best ? Confirmation::Confirmed : Confirmation::Refuted;
     }
   }
 
-  std::vector<Interaction<Model>> learn_, held_out_;
+  std::vector<Interaction<Model>> learn_, held_out_, references_;
   RunJobs run_jobs_;
   MissingEffectSettings settings_;
+  Discrepancy discrepancy_{};
   std::size_t runs_ = 0;
 };
 

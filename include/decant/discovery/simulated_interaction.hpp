@@ -76,8 +76,9 @@ struct InteractionEffect : Effect {
 
 /// Settings of SimulatedInteraction.
 struct SimulatedInteractionSettings {
-  double spacing = 0.005;                                 ///< of the model's particles [m], > 0
-  std::vector<double> tolerated_spacings{0.94, 1, 1.06};  ///< over it, one of which is drawn where all is tolerated
+  double spacing = 0.005;  ///< of the model's particles [m], > 0
+  /// Over it, one of which is drawn where all is tolerated: what a solver makes of its spacing is not what is missing.
+  std::vector<double> tolerated_spacings{0.85, 0.92, 1, 1.08, 1.15};
   double jitter = 0.05;            ///< of particles where they start, over their spacing, 0 .. 0.3
   int cell_px = 10;                ///< of silhouettes
   double longest_step = 1.0 / 60;  ///< for which the model is told to run at a time [s], > 0
