@@ -53,8 +53,7 @@ class EffectExperiment {
   /// Throws std::runtime_error where the folder cannot be written to.
   explicit EffectExperiment(EffectExperimentOptions options)
       : options_(std::move(options)),
-        recordings_(options_.folder, options_.threads, false),
-        folder_(options_.folder, 1, options_.again),  // a case after the other: its runs are made side by side
+        folder_(options_.folder, options_.threads, options_.again),
         executor_({options_.threads}) {
     decant::detail::make_folder(options_.folder / "runs");
   }
@@ -71,7 +70,7 @@ class EffectExperiment {
                               }});
       }
     }
-    recordings_.record(recordings);
+    folder_.record(recordings);
   }
 
   /// Judges what is not judged yet.
@@ -80,13 +79,12 @@ class EffectExperiment {
     for (const EffectCase& each : cases) {
       jobs.push_back({key(each), settings_json(each), [this, each](const auto&) { return judge(each); }});
     }
-    folder_.run("finding effects", jobs);
+    folder_.run("finding effects", jobs, true);  // the runs for one are made side by side
   }
 
   /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
   const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
   const ExperimentFolder& folder() const { return folder_; }
-  std::size_t recorded() const { return recordings_.recorded(); }
 
  private:
   std::string key(const EffectCase& of) const { return case_name(of) + (options_.both ? "_both" : ""); }
@@ -112,8 +110,8 @@ class EffectExperiment {
   nlohmann::json judge(const EffectCase& of) {
     std::vector<RecordedInteraction> kept;
     for (const std::size_t which : {0, 1}) {
-      kept.push_back(recorded_interaction(decant::read_recording(recordings_.recording(recording_name(of, which))),
-                                          options_.model));
+      kept.push_back(
+          recorded_interaction(decant::read_recording(folder_.recording(recording_name(of, which))), options_.model));
     }
     std::vector<decant::Interaction<RecordedModel>> learn{kept[0].interaction("a")}, held_out;
     (options_.both ? learn : held_out).push_back(kept[1].interaction("b"));
@@ -138,12 +136,12 @@ class EffectExperiment {
     json["status"] = "ok";
     json["seconds"] = 1e-3 * milliseconds;
     json["runs_computed"] = computed;
-    json["truth"] = recordings_.truth(recording_name(of, 0));
+    json["truth"] = folder_.truth(recording_name(of, 0));
     return json;
   }
 
   EffectExperimentOptions options_;
-  ExperimentFolder recordings_, folder_;
+  ExperimentFolder folder_;
   decant::ThreadExecutor executor_;
 };
 

@@ -153,6 +153,15 @@ inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores)
       kinds.push_back(each.of->kind);
     }
   }
+  const std::vector<std::pair<std::string, AnswerScore>> shown{{"right", AnswerScore::Right},
+                                                               {"one of several", AnswerScore::OneOf},
+                                                               {"unexplained", AnswerScore::Abstains},
+                                                               {"missed", AnswerScore::Missed},
+                                                               {"wrong", AnswerScore::Wrong}};
+  section.bars = decant::BarChart{"Answers by what is hidden", "", "of the cases [%]", kinds, {}, {100}};
+  for (const auto& [name, score] : shown) {
+    section.bars->bars.push_back({name, {}});
+  }
   for (const std::string& kind : kinds) {
     std::map<AnswerScore, std::size_t> count;
     std::size_t all = 0, physics = 0;
@@ -162,6 +171,10 @@ inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores)
         ++count[each.score()];
         physics += each.blames_physics() ? 1 : 0;
       }
+    }
+    for (std::size_t k = 0; k < shown.size(); ++k) {
+      section.bars->bars[k].heights.push_back(100.0 * static_cast<double>(count[shown[k].second]) /
+                                              static_cast<double>(all));
     }
     const auto text = [&](AnswerScore score) { return std::to_string(count[score]); };
     section.table.add({kind, std::to_string(all), text(AnswerScore::Right),

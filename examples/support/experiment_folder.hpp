@@ -100,8 +100,8 @@ class ExperimentFolder {
     recorded_ += missing.size();
   }
 
-  /// Computes what is not there yet; afterwards all have a result().
-  void run(const std::string& label, const std::vector<ExperimentJob>& jobs) {
+  /// Computes what is not there yet; afterwards all have a result(). @param one_by_one for jobs that use all threads.
+  void run(const std::string& label, const std::vector<ExperimentJob>& jobs, bool one_by_one = false) {
     std::vector<const ExperimentJob*> missing;
     for (const ExperimentJob& job : jobs) {
       if (results_.contains(job.key) ||
@@ -118,7 +118,8 @@ class ExperimentFolder {
     }
     TogetherProgress progress(label, missing.size());
     std::mutex guard;
-    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index number) {
+    const int threads = one_by_one ? 1 : threads_;
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads}, [&](decant::Index number) {
       const auto k = static_cast<std::size_t>(number);
       const ExperimentJob& job = *missing[k];
       nlohmann::json result = job.compute([&](double share) { progress.update(k, share); });
