@@ -106,7 +106,7 @@ int main(int count, char** values) {
                 example::candidates_table(effects, result).text().c_str());
     example::in_first_process(executor, [&] {
       if (!json_file.empty()) {
-        nlohmann::json json = example::missing_effect_json(effects, result);
+        nlohmann::json json = example::missing_effect_json(effects, result, kept.front()->recording.gravity);
         json["seconds"] = 1e-3 * milliseconds;
         json["spacing_mm"] = spacing_mm;
         json["references"] = reference_folders.size();

@@ -13,6 +13,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/missing_effect.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/report.hpp>
@@ -53,7 +54,8 @@ inline std::string components_text(const Eigen::VectorXd& values) {
   return text;
 }
 
-inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedEffect& found) {
+inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedEffect& found,
+                                  const decant::Vector3<double>& gravity) {
   const decant::Effect& effect = effects.at(found.effect);
   nlohmann::json json = {{"effect", effect.name},
                          {"where", effect.where},
@@ -75,7 +77,9 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
     json["window_s"] = {number_json(found.window->from), number_json(found.window->until)};
   }
   if (effect.name == "lateral_force" && found.strength.norm() > 0) {
-    json["direction_w"] = {found.strength[0] / found.strength.norm(), found.strength[1] / found.strength.norm(), 0.0};
+    const auto level = decant::level_directions(gravity);
+    const decant::Vector3<double> way = (found.strength[0] * level[0] + found.strength[1] * level[1]).normalized();
+    json["direction_w"] = {way.x(), way.y(), way.z()};
   }
   return json;
 }
@@ -161,8 +165,9 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   return text + " % of what is reducible.";
 }
 
+/// @param gravity of the recordings [m/s^2].
 inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& effects,
-                                          const decant::MissingEffect& result) {
+                                          const decant::MissingEffect& result, const decant::Vector3<double>& gravity) {
   using decant::Confirmation;
   using decant::Verdict;
   nlohmann::json json;
@@ -178,7 +183,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
     }
   }
   for (const decant::RefinedEffect& each : result.found) {
-    json["found"].push_back(detail::effect_json(effects, each));
+    json["found"].push_back(detail::effect_json(effects, each, gravity));
   }
   if (!result.found.empty()) {
     const nlohmann::json first = json["found"].front();
@@ -187,7 +192,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
     }
   }
   for (const decant::RefinedEffect& each : result.refined) {
-    json["refined"].push_back(detail::effect_json(effects, each));
+    json["refined"].push_back(detail::effect_json(effects, each, gravity));
   }
   for (const decant::EffectStanding& each : result.judgement.standings) {
     json["candidates"].push_back({{"effect", effects.at(each.effect).name},

@@ -262,10 +262,10 @@ inline PourPlaces pour_places(const decant::Recording& recording) {
 /// The catalogue, as far as it applies to a recording.
 inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording) {
   using namespace decant;
-  auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density);
+  auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density, recording.gravity);
   const PourPlaces places = pour_places(recording);
   const Vector3<double> up = -recording.gravity.normalized();
-  const Vector3<double> across = up.unitOrthogonal(), along = up.cross(across);
+  const auto [across, along] = level_directions(recording.gravity);
   const double aside = 0.08;  // [m]
   effects.push_back(suction_effect<EffectModel>(places.jet + aside * across, "beside the jet, one side"));
   effects.push_back(suction_effect<EffectModel>(places.jet - aside * across, "beside the jet, the other side"));
@@ -328,9 +328,9 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
     effects.push_back(std::move(effect));
   }
   effects.push_back(passing_force_effect<EffectModel>({begin + 0.2 * seconds, begin + 0.6 * seconds}, 0.25 * seconds,
-                                                      "for a while, early"));
+                                                      "for a while, early", recording.gravity));
   effects.push_back(passing_force_effect<EffectModel>({begin + 0.5 * seconds, begin + 0.95 * seconds}, 0.25 * seconds,
-                                                      "for a while, late"));
+                                                      "for a while, late", recording.gravity));
   return effects;
 }
 

@@ -219,6 +219,16 @@ TEST_CASE("simulated interaction: effects reach the model, and amounts are what 
         Approx(-9));
   CHECK(number("lateral_force", {0.5, -0.25},
                [](auto& m) { return m.template force<BodyAcceleration<float>>().pull.y(); }) == -0.25);
+  // sideways is level wherever gravity points
+  for (const Vector3<double>& gravity :
+       {Vector3<double>(0, 0, -9.81), Vector3<double>(0, -9, 4), Vector3<double>(9, 0, 0)}) {
+    const auto level = level_directions(gravity);
+    CHECK(std::abs(level[0].dot(gravity)) + std::abs(level[1].dot(gravity)) + std::abs(level[0].dot(level[1])) < 1e-12);
+    CHECK(level[0].norm() == Approx(1));
+    CHECK(level[0].cross(level[1]).dot(gravity) == Approx(-gravity.norm()));
+  }
+  CHECK(level_directions({0, 0, -9.81})[0] == Vector3<double>::UnitX());
+  CHECK(force_effects<PourModel>(1e-6, {0, 0, 0}).size() + 1 == force_effects<PourModel>(1e-6).size());
   CHECK(number("suction", {6}, [](auto& m) { return m.template force<Suction<float>>().strength; }) == 6);
   CHECK(number("suction", {6}, [](auto& m) { return m.template force<Suction<float>>().point.x(); }) == Approx(0.1));
   ModelRun elsewhere = run_with(pour, "suction", {6});

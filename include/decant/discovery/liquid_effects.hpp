@@ -4,6 +4,7 @@
 /// The catalogue of effects that a liquid simulation may lack, each with its unit, its range and what it does to a run.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -114,11 +115,37 @@ InteractionEffect<Model> run_effect(Effect effect, EffectKind kind, Apply apply)
 
 }  // namespace detail
 
+/// Two level directions, square to each other: the world's x and y where gravity is along its z.
+inline std::array<Vector3<double>, 2> level_directions(const Vector3<double>& gravity) {
+  const Vector3<double> up = -gravity.normalized();
+  const Vector3<double> other = std::abs(up.x()) < 0.9 ? Vector3<double>::UnitX() : Vector3<double>::UnitZ();
+  const Vector3<double> first = (other - other.dot(up) * up).normalized();
+  return {first, up.cross(first)};
+}
+
+namespace detail {
+
+/// Sets a pull in level directions, by their components, for the time that it lasts.
+template <class Scalar>
+auto level_pull(const Vector3<double>& gravity) {
+  return [level = level_directions(gravity)](BodyAcceleration<Scalar>& force, const AppliedEffect& as) {
+    const Vector3<double> pull = as.strength[0] * level[0] + as.strength[1] * level[1];
+    force.pull = pull.template cast<Scalar>();
+    if (as.window) {
+      force.from = as.window->from;
+      force.until = as.window->until;
+    }
+  };
+}
+
+}  // namespace detail
+
 /// Effects by forces that act on all liquid alike, for a model of EffectParts or more. Strengths are what pours of some
 /// centimetres to decimetres can show; what is tolerated is what a calibrated model is not sure of.
-/// @param kinematic_viscosity that the model has [m^2/s].
+/// @param kinematic_viscosity that the model has [m^2/s]. @param gravity that it has [m/s^2].
 template <class Model>
-std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) {
+std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
+                                                    const Vector3<double>& gravity = {0, 0, -9.81}) {
   using Scalar = typename Model::Scalar;
   using detail::plain_effect;
   std::vector<InteractionEffect<Model>> effects;
@@ -165,39 +192,37 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity) 
   Effect pull = plain_effect("lateral_force", "", "m/s^2",
                              "something pulls the liquid sideways: wind, or a table that "
                              "is not level",
-                             {"x", 0, -1.2, 1.2, 0.03}, "simulator.force<BodyAcceleration<float>>().pull = {@, @, 0};");
+                             {"x", 0, -1.2, 1.2, 0.03},
+                             "simulator.force<BodyAcceleration<float>>().pull = @ * level[0] + @ * level[1];");
   pull.components.push_back({"y", 0, -1.2, 1.2, 0.03});
-  effects.push_back(
-      force_effect<BodyAcceleration<Scalar>, Model>(pull, [](BodyAcceleration<Scalar>& force, const AppliedEffect& as) {
-        force.pull = {static_cast<Scalar>(as.strength[0]), static_cast<Scalar>(as.strength[1]), Scalar(0)};
-      }));
+  effects.push_back(force_effect<BodyAcceleration<Scalar>, Model>(pull, detail::level_pull<Scalar>(gravity)));
+  const double weight = gravity.norm();
+  if (weight == 0) {
+    return effects;
+  }
   effects.push_back(force_effect<Gravity<Scalar>, Model>(
-      plain_effect("gravity", "", "m/s^2", "gravity is other than assumed", {"", 9.81, 7.85, 11.77},
-                   "simulator.force<Gravity<float>>().acceleration *= @ / 9.81;"),
-      [](auto& force, double s) { force.acceleration *= static_cast<Scalar>(s / 9.81); }));
+      plain_effect("gravity", "", "m/s^2", "gravity is other than assumed", {"", weight, 0.8 * weight, 1.2 * weight},
+                   "simulator.force<Gravity<float>>().acceleration *= @ / assumed;"),
+      [weight](auto& force, double s) { force.acceleration *= static_cast<Scalar>(s / weight); }));
   return effects;
 }
 
 /// A sideways pull that does not last. @param window about when [s]. @param tolerance of its ends. @param where in
-/// words: "in the beginning".
+/// words: "in the beginning". @param gravity that the model has [m/s^2].
 template <class Model>
-InteractionEffect<Model> passing_force_effect(const TimeWindow& window, double tolerance, std::string where) {
+InteractionEffect<Model> passing_force_effect(const TimeWindow& window, double tolerance, std::string where,
+                                              const Vector3<double>& gravity = {0, 0, -9.81}) {
   using Scalar = typename Model::Scalar;
-  Effect effect =
-      detail::plain_effect("lateral_force", "", "m/s^2",
-                           "something pulls the liquid sideways for a while, such as a gust", {"x", 0, -1.2, 1.2},
-                           "auto& pull = simulator.force<BodyAcceleration<float>>(); pull.pull = {@, @, 0}; "
-                           "pull.from = ~; pull.until = ~;");
+  Effect effect = detail::plain_effect(
+      "lateral_force", "", "m/s^2", "something pulls the liquid sideways for a while, such as a gust",
+      {"x", 0, -1.2, 1.2},
+      "auto& pull = simulator.force<BodyAcceleration<float>>(); pull.pull = @ * level[0] + @ * level[1]; "
+      "pull.from = ~; pull.until = ~;");
   effect.components.push_back({"y", 0, -1.2, 1.2});
   effect.window = window;
   effect.window_tolerance = tolerance;
   effect.where = std::move(where);
-  return force_effect<BodyAcceleration<Scalar>, Model>(
-      effect, [](BodyAcceleration<Scalar>& force, const AppliedEffect& as) {
-        force.pull = {static_cast<Scalar>(as.strength[0]), static_cast<Scalar>(as.strength[1]), Scalar(0)};
-        force.from = as.window->from;
-        force.until = as.window->until;
-      });
+  return force_effect<BodyAcceleration<Scalar>, Model>(effect, detail::level_pull<Scalar>(gravity));
 }
 
 /// A pull toward a point. @param place [m], world frame. @param where in words.
