@@ -104,6 +104,10 @@ int main(int count, char** values) {
     std::printf("%s\n%s%s%s", example::missing_effect_sentence(effects, result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
                 example::candidates_table(effects, result).text().c_str());
+    if (result.verdict == decant::Verdict::Nothing) {
+      std::printf("What would have been seen in about nine of ten such recordings:\n%s",
+                  example::smallest_seen_table(effects, result).text().c_str());
+    }
     example::in_first_process(executor, [&] {
       if (!json_file.empty()) {
         nlohmann::json json = example::missing_effect_json(effects, result, kept.front()->recording.gravity);

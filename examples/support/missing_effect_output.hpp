@@ -202,6 +202,15 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                                   {"share", number_json(each.share)},
                                   {"vote", number_json(each.vote)}});
   }
+  for (const decant::SmallestSeen& each : result.smallest_seen) {
+    const decant::Effect& effect = effects.at(each.effect);
+    json["smallest_seen"].push_back({{"effect", effect.name},
+                                     {"where", effect.where},
+                                     {"component", effect.components[each.component].name},
+                                     {"unit", effect.unit},
+                                     {"below", number_json(each.below)},
+                                     {"above", number_json(each.above)}});
+  }
   const decant::Disagreement* earliest = nullptr;
   for (const auto& recording : result.where) {
     for (const decant::Disagreement& each : recording) {
@@ -253,6 +262,20 @@ inline decant::Table candidates_table(const std::vector<decant::Effect>& effects
     row.push_back(is ? fixed_text(refined->distance, 2) : "");
     row.push_back(is ? fixed_text(100 * refined->share, 0) : "");
     table.add(row);
+  }
+  return table;
+}
+
+/// How strong effects have to be for these recordings to tell.
+inline decant::Table smallest_seen_table(const std::vector<decant::Effect>& effects,
+                                         const decant::MissingEffect& result) {
+  decant::Table table({"effect", "unit", "assumed", "less than", "more than"});
+  const auto text = [](double strength) { return std::isfinite(strength) ? three_digits(strength) : std::string(); };
+  for (const decant::SmallestSeen& each : result.smallest_seen) {
+    const decant::Effect& effect = effects.at(each.effect);
+    const decant::EffectComponent& component = effect.components[each.component];
+    table.add({effect.words() + (component.name.empty() ? "" : ": ") + component.name, effect.unit,
+               three_digits(component.base), text(each.below), text(each.above)});
   }
   return table;
 }

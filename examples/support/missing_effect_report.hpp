@@ -204,6 +204,11 @@ inline void write_missing_effect_report(const std::string& file,
   }
   report.heading("Candidates");
   report.table(candidates_table(effects, result));
+  report.heading("What would have been seen");
+  report.paragraph(
+      "Strengths beyond which an effect would have been told from chance in about nine of ten recordings "
+      "such as these; none where even the strongest that were simulated would not.");
+  report.table(smallest_seen_table(effects, result));
   report.write(file);
 }
 

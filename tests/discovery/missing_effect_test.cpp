@@ -90,6 +90,30 @@ TEST_CASE("missing effect: nothing where nothing is, also where all is off withi
   }
 }
 
+TEST_CASE("missing effect: what would have been seen is seen, and what would not is not") {
+  const MissingEffect nothing = found_in({}, 51);
+  REQUIRE(nothing.smallest_seen.size() == 4);  // fat masks are not judged
+  const auto of = [&](std::size_t effect) {
+    REQUIRE(nothing.smallest_seen[effect].effect == effect);
+    return nothing.smallest_seen[effect];
+  };
+  const double drag = of(0).above, pull = of(1).above, against = of(1).below, late = of(3).above;
+  CHECK(std::isnan(of(0).below));  // there is no drag below none
+  CHECK((against < 0 && pull > 0 && late > 0));
+  int seen = 0, imagined = 0;
+  for (const std::uint32_t seed : {51U, 52U, 53U, 54U}) {
+    for (const Jet& jet : {Jet{drag}, Jet{0, pull}, Jet{0, against}, Jet{0, 0, 1, late}}) {
+      const auto scaled = [&](double factor) {
+        return found_in({factor * jet.drag, factor * jet.pull, 1, factor * jet.late}, seed).verdict != Verdict::Nothing;
+      };
+      seen += scaled(1) ? 1 : 0;
+      imagined += scaled(0.15) ? 1 : 0;
+    }
+  }
+  CHECK(seen >= 13);
+  CHECK(imagined <= 2);
+}
+
 TEST_CASE("missing effect: what is not in the catalogue is unexplained, and where it begins is told") {
   const MissingEffect result = found_in({0, 0, 1, 0, 12}, 61);
   CHECK(result.verdict == Verdict::Unexplained);

@@ -65,6 +65,9 @@ class EffectCurve {
     const Eigen::MatrixXd normal = at * at.transpose();
     const Eigen::MatrixXd solved = normal.ldlt().solve(at * standardised.transpose()).transpose();
     const auto count = static_cast<Eigen::Index>(2 * components.size());
+    uncertainty_.setZero(count, count);
+    const Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+    uncertainty_(used, used) = inverse;
     coefficient_.setZero(differences.rows(), count);
     for (std::size_t k = 0; k < used.size(); ++k) {
       coefficient_.col(used[k]) = solved.col(static_cast<Eigen::Index>(k));
@@ -81,6 +84,13 @@ class EffectCurve {
 
   /// What the effect changes, in standardised features.
   Eigen::VectorXd at(const Strength& strength) const { return coefficient_ * detail::strength_terms(axes_, strength); }
+
+  /// How far the effect takes features at a strength, as a distance. @param chaos distance of a single simulation from
+  /// the mean of many, which the curve has a share of, and which is taken off.
+  double energy(const Strength& strength, double chaos) const {
+    const Eigen::VectorXd phi = detail::strength_terms(axes_, strength);
+    return phi.dot(square_ * phi) - chaos * phi.dot(uncertainty_ * phi);
+  }
 
   /// By component, from the base to the largest strengths that were simulated.
   const std::vector<StrengthAxis>& axes() const noexcept { return axes_; }
@@ -118,6 +128,7 @@ class EffectCurve {
   std::vector<StrengthAxis> axes_;
   Eigen::MatrixXd coefficient_{};  ///< p x two for each component
   Eigen::MatrixXd square_{};
+  Eigen::MatrixXd uncertainty_{};  ///< covariance of the coefficients of a feature, over the variance of chaos
 };
 
 }  // namespace decant::inline DECANT_TARGET

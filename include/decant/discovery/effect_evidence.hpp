@@ -98,6 +98,21 @@ class RecordedEvidence {
   const Eigen::VectorXd& recorded_features() const noexcept { return own_; }
   const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
 
+  /// What an effect changes; nothing where nothing is known of it. This has to outlive it.
+  std::optional<EffectCurve> curve(std::size_t effect) const {
+    const std::vector<std::size_t> runs = telling_runs(effect);
+    return runs.empty() ? std::nullopt : std::optional<EffectCurve>(curve(effect, runs, *space_));
+  }
+  /// Mean distance of a single run of the model as it is from the mean of many; 0 with only one of them.
+  double chaos() const {
+    const Eigen::MatrixXd off = sample_.baseline.colwise() - sample_.baseline.rowwise().mean();
+    double sum = 0;
+    for (Eigen::Index k = 0; k < off.cols(); ++k) {
+      sum += space_->distance(space_->standardised_difference(off.col(k)));
+    }
+    return off.cols() > 1 ? sum / static_cast<double>(off.cols() - 1) : 0;
+  }
+
   /// What the recording says.
   EffectEvidence of_recording() const { return evidence(recording_, own_, *space_); }
 

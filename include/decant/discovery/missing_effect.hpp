@@ -111,6 +111,13 @@ struct GapChange {
   double share() const noexcept { return (before - after) / std::max(before - noise, 1e-12); }
 };
 
+/// The least strengths of an effect's component, to both sides of its base, that would have been told from chance in
+/// about nine of ten recordings; NaN where none would have been up to the end of the range.
+struct SmallestSeen {
+  std::size_t effect = 0, component = 0;
+  double below = std::numeric_limits<double>::quiet_NaN(), above = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// What was found.
 struct MissingEffect {
   Verdict verdict = Verdict::Nothing;
@@ -119,6 +126,7 @@ struct MissingEffect {
   std::vector<std::size_t> one_of{};     ///< of OneOf: numbers of effects that are not told apart
   Judgement judgement{};                 ///< of the first round, before refinement
   std::vector<std::vector<Disagreement>> where{};  ///< by recording, before anything was added
+  std::vector<SmallestSeen> smallest_seen{};       ///< of each effect that is judged
   GapChange learn{}, held_out{};
   Confirmation confirmation = Confirmation::Untested;
   std::size_t runs = 0;  ///< of models
@@ -173,6 +181,7 @@ class MissingEffectSearch {
           result.where.push_back(find_disagreements(each.features(), beyond_chance(each), settings_.threshold));
         }
         result.judgement = judgement;
+        result.smallest_seen = smallest_seen(known);
       }
       if (judgement.verdict == Verdict::Nothing) {
         break;
@@ -341,6 +350,64 @@ class MissingEffectSearch {
       }
     }
     return most;
+  }
+
+  std::vector<SmallestSeen> smallest_seen(const Knowledge& known) const {
+    std::vector<SmallestSeen> result;
+    std::vector<double> chaos;
+    for (const RecordedEvidence& each : known.recorded) {
+      chaos.push_back(each.chaos());
+    }
+    // Three times the strength at which energy is what chance may explain: a recording has noise of its own, and a
+    // curve does not follow all that happens at strengths that were not simulated. Measured on thrown balls, for nine
+    // of ten.
+    constexpr double margin = 3 * 3;
+    const double needed =
+        margin * known.chance.fall * known.chance.distance * static_cast<double>(known.recorded.size());
+    for (std::size_t effect = 0; effect < effects().size(); ++effect) {
+      std::vector<EffectCurve> curves;  // by recording
+      for (const RecordedEvidence& each : known.recorded) {
+        if (auto curve = each.curve(effect)) {
+          curves.push_back(std::move(*curve));
+        }
+      }
+      if (curves.size() < known.recorded.size()) {
+        continue;
+      }
+      for (std::size_t component = 0; component < effects()[effect].components.size(); ++component) {
+        const EffectComponent& of = effects()[effect].components[component];
+        const auto energy = [&](double strength) {
+          Eigen::VectorXd at = effects()[effect].base();
+          at[static_cast<Eigen::Index>(component)] = strength;
+          double sum = 0;
+          for (std::size_t k = 0; k < curves.size(); ++k) {
+            sum += curves[k].energy(at, chaos[k]);
+          }
+          return sum;
+        };
+        const auto least = [&](double end) {
+          const auto at = [&](double share) { return of.base + share * (end - of.base); };
+          if (end == of.base || energy(end) <= needed) {
+            return std::numeric_limits<double>::quiet_NaN();
+          }
+          // Below what was simulated, energy grows with the square of the strength at first, and less from where things
+          // are off by more than a feature's size on: so it is at least so large.
+          const double simulated =
+              *std::min_element(settings_.dictionary.shares.begin(), settings_.dictionary.shares.end());
+          if (const double there = energy(at(simulated)); there > needed) {
+            return at(simulated * std::sqrt(needed / there));
+          }
+          double unseen = simulated, seen = 1;
+          for (int halving = 0; halving < 20; ++halving) {
+            const double half = 0.5 * (unseen + seen);
+            (energy(at(half)) > needed ? seen : unseen) = half;
+          }
+          return at(seen);
+        };
+        result.push_back({effect, component, least(of.low), least(of.high)});
+      }
+    }
+    return result;
   }
 
   /// Deviations of the recording, each over what draws have there.
