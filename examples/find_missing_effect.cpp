@@ -4,12 +4,16 @@
 // Exit status 0: done; 2: a recording, a file or an argument is wrong.
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -38,7 +42,7 @@ using Interactions = std::vector<decant::Interaction<example::RecordedModel>>;
 int main(int count, char** values) {
   const example::SweepSession session;
   std::string json_file, report_file, journal_file;
-  std::vector<std::string> learn_folders, held_out_folders, reference_folders;
+  std::vector<std::string> learn_folders, held_out_folders, reference_folders, tolerances;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double spacing_mm = 1e3 * options.model.spacing;
@@ -51,6 +55,11 @@ int main(int count, char** values) {
   app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
   app.add_option("--json", json_file, "writes what was found");
   app.add_option("--report", report_file, "writes a page with a film, charts and tables, for a browser");
+  app.add_option(
+         "--tolerance", tolerances,
+         "how far off the model may be and nothing is missing, such as latency=0.004 or body_pose=0.001, in the "
+         "effect's unit; several by commas")
+      ->delimiter(',');
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--draws", settings.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
@@ -62,6 +71,17 @@ int main(int count, char** values) {
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
     example::expect_apart(learn_folders, held_out_folders, reference_folders);
     options.model.spacing = 1e-3 * spacing_mm;
+    for (const std::string& each : tolerances) {
+      const std::size_t sign = each.find('=');
+      const std::string number = sign == std::string::npos ? "" : each.substr(sign + 1);
+      double value = -1;
+      const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
+      if (error != std::errc() || end != number.data() + number.size() || !(value >= 0) || !std::isfinite(value)) {
+        throw std::runtime_error(
+            "--tolerance: expected a name and a number that is not negative, such as latency=0.004, not " + each);
+      }
+      options.tolerances[each.substr(0, sign)] = value;
+    }
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
     const auto read = [&](const std::vector<std::string>& folders) {
       Interactions interactions;

@@ -266,6 +266,20 @@ inline decant::Table candidates_table(const std::vector<decant::Effect>& effects
   return table;
 }
 
+/// What is no gap: so far off the model may be in everything at once.
+inline decant::Table tolerated_table(const std::vector<decant::Effect>& effects) {
+  decant::Table table({"effect", "unit", "assumed", "tolerated to each side"});
+  for (const decant::Effect& effect : effects) {
+    for (const decant::EffectComponent& component : effect.components) {
+      if (component.tolerance > 0) {
+        table.add({effect.words() + (component.name.empty() ? "" : ": ") + component.name, effect.unit,
+                   three_digits(component.base), three_digits(component.tolerance)});
+      }
+    }
+  }
+  return table;
+}
+
 /// How strong effects have to be for these recordings to tell.
 inline decant::Table smallest_seen_table(const std::vector<decant::Effect>& effects,
                                          const decant::MissingEffect& result) {

@@ -204,6 +204,8 @@ inline void write_missing_effect_report(const std::string& file,
   }
   report.heading("Candidates");
   report.table(candidates_table(effects, result));
+  report.heading("What is tolerated");
+  report.table(tolerated_table(effects));
   report.heading("What would have been seen");
   report.paragraph(
       "Strengths beyond which an effect would have been told from chance in about nine of ten recordings "

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <optional>
@@ -41,6 +42,7 @@ using RecordedModel = decant::SimulatedInteraction<EffectModel, decant::Distorte
 struct InteractionOptions {
   double frames_per_second = 15;  ///< of those of the recording that are compared
   decant::SimulatedInteractionSettings model{};
+  std::map<std::string, double> tolerances{};  ///< by effect: of each of its components, in place of the catalogue's
 };
 
 namespace detail {
@@ -350,7 +352,7 @@ struct RecordedInteraction {
 };
 
 /// Throws std::invalid_argument and std::runtime_error for recordings without cameras or with an amount that is not
-/// known.
+/// known, and for tolerances of effects that there are not.
 inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
   using namespace decant;
   if (recording.cameras.empty()) {
@@ -386,7 +388,22 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     tracking.initial_amount_factor = fill;
     return model_of<EffectParts<float>>(*start_of, tracking);
   };
-  RecordedModel model(std::move(scene), detail::catalogue_of(recording), options.model);
+  auto catalogue = detail::catalogue_of(recording);
+  for (const auto& [name, tolerance] : options.tolerances) {
+    bool found = false;
+    for (auto& effect : catalogue) {
+      if (effect.name == name) {
+        found = true;
+        for (EffectComponent& component : effect.components) {
+          component.tolerance = tolerance;
+        }
+      }
+    }
+    if (!found) {
+      throw std::runtime_error("tolerance of '" + name + "': expected an effect of the catalogue of " + recording.name);
+    }
+  }
+  RecordedModel model(std::move(scene), std::move(catalogue), options.model);
   return {std::move(recording), std::move(model), std::move(frames), std::move(seen)};
 }
 

@@ -36,7 +36,7 @@ inline double relative_fall(double before, double after) noexcept { return (befo
 
 /// Factors on what the draws' worst was.
 struct JudgementSettings {
-  double distance_factor = 1.3;  ///< >= 1: a solver is farther from reality than its own runs are from each other
+  double distance_factor = 1.6;  ///< >= 1: a solver is farther from reality than its own runs are from each other
   double fall_factor = 1.3;      ///< >= 1
   double gap_factor = 1.3;       ///< >= 1
   double least_share = 0.6;      ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
