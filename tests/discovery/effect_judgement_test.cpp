@@ -170,7 +170,7 @@ TEST_CASE("effect judgement: chance is what the worst of the draws does, and a l
   settings.distance_factor = 1.1;
   settings.fall_factor = settings.gap_factor = 2;
   const ChanceLevel level = chance_level({draws}, settings);
-  CHECK(level.distance == Approx(1.25));
+  CHECK(level.distance == Approx(1.1 * 1.25));
   CHECK(level.largest_distance == Approx(1.65));
   CHECK(level.fall == Approx(2 * 0.05 / 0.95));  // where least is left
   CHECK(level.overlap == Approx(2 * 0.02 / 0.4));

@@ -24,7 +24,7 @@ namespace decant::inline DECANT_TARGET {
 
 /// What chance does where nothing is missing, by draws left out.
 struct ChanceLevel {
-  double distance = 0;              ///< mean of draws
+  double distance = 0;              ///< in the mean: what is farther is reducible
   double largest_distance = 0;      ///< beyond it something is off that is not tolerated
   double fall = 0;                  ///< relative_fall by any effect: what is larger is no chance
   double overlap = 0, blurred = 0;  ///< the same of the gaps, over the gap itself
@@ -34,11 +34,11 @@ struct ChanceLevel {
 /// as what a solver has of its own, and that is the scale of what is left: so is the F-test's of linear models.
 inline double relative_fall(double before, double after) noexcept { return (before - after) / std::max(after, 1e-12); }
 
-/// Factors on what the draws' worst was.
+/// Factors on what draws do.
 struct JudgementSettings {
   double distance_factor = 1.6;  ///< >= 1: a solver is farther from reality than its own runs are from each other
-  double fall_factor = 1.3;      ///< >= 1
-  double gap_factor = 1.3;       ///< >= 1
+  double fall_factor = 1.3;      ///< on the worst of them, >= 1
+  double gap_factor = 1.3;       ///< on the worst of them, >= 1
   double least_share = 0.6;      ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
   double vote_margin = 0.15;     ///< families this close to the best are not told apart; 0 .. 1
 };
@@ -144,7 +144,7 @@ inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& 
     }
     const detail::JointEvidence joint = detail::joined(of);
     const auto recordings = static_cast<double>(of.size());
-    level.distance += joint.distance / static_cast<double>(count);
+    level.distance += settings.distance_factor * joint.distance / static_cast<double>(count);
     level.largest_distance = std::max(level.largest_distance, settings.distance_factor * joint.distance);
     for (const auto& profile : joint.profile) {
       if (profile) {

@@ -103,7 +103,7 @@ enum class Confirmation {
 struct GapChange {
   double before = std::numeric_limits<double>::quiet_NaN();
   double after = std::numeric_limits<double>::quiet_NaN();
-  double noise = std::numeric_limits<double>::quiet_NaN();       ///< of draws, in the mean
+  double noise = std::numeric_limits<double>::quiet_NaN();       ///< where nothing is missing, in the mean
   double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
   double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
 
@@ -492,6 +492,12 @@ class MissingEffectSearch {
 
   using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
 
+  std::size_t middle_seeds() const noexcept { return static_cast<std::size_t>(settings_.refinement_seeds); }
+  /// Of runs to each side of a number. Places and times have many numbers, each of which is off by a lot there.
+  std::size_t slope_seeds(const EffectPoint& point) const noexcept {
+    return point.size() <= 2 ? middle_seeds() : (middle_seeds() + 1) / 2;
+  }
+
   /// Leaves the best one, the next best one as its rival, and all others that may come near it.
   void keep_promising(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
                       const ChanceLevel& chance) const {
@@ -516,19 +522,18 @@ class MissingEffectSearch {
   /// @param expected what should be left after the step; infinite where runs fail.
   void step_all(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
                 const Knowledge& known, std::uint32_t seed) {
-    const auto seeds = static_cast<std::size_t>(settings_.refinement_seeds);
     std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
-    const auto ask = [&](const Interaction<Model>& of, const EffectPoint& point) {
+    const auto ask = [&](const Interaction<Model>& of, const EffectPoint& point, std::size_t seeds) {
       for (std::size_t k = 0; k < seeds; ++k) {
         runs.emplace_back(&of, point.run(seed + static_cast<std::uint32_t>(runs.size())));
       }
     };
     for (const EffectPoint& point : points) {
       for (const Interaction<Model>& of : learn_) {
-        ask(of, point);
+        ask(of, point, middle_seeds());
         for (Eigen::Index k = 0; k < point.size(); ++k) {
-          ask(of, point.with(k, point.value()[k] - point.step(k)));
-          ask(of, point.with(k, point.value()[k] + point.step(k)));
+          ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
+          ask(of, point.with(k, point.value()[k] + point.step(k)), slope_seeds(point));
         }
       }
     }
@@ -544,7 +549,7 @@ class MissingEffectSearch {
         if (auto view = view_of(points[which], recorded, next)) {
           views[which].push_back(std::move(*view));
         }
-        next += seeds * static_cast<std::size_t>(1 + 2 * points[which].size());
+        next += middle_seeds() + slope_seeds(points[which]) * static_cast<std::size_t>(2 * points[which].size());
       }
       if (views[which].size() < known.recorded.size()) {
         views[which].clear();
@@ -569,17 +574,18 @@ class MissingEffectSearch {
   /// @param seen of runs at the point, then below and above of each of its numbers.
   std::optional<RefinementView> view_of(const EffectPoint& point, const RecordedEvidence& recorded,
                                         const Series* seen) const {
-    const auto seeds = static_cast<std::size_t>(settings_.refinement_seeds);
-    const auto middle = mean_features(recorded, seen, seeds);
+    const std::size_t seeds = slope_seeds(point);
+    const auto middle = mean_features(recorded, seen, middle_seeds());
+    seen += middle_seeds();
     if (!middle) {
       return std::nullopt;
     }
     RefinementView view{&recorded.space(), *middle, Eigen::MatrixXd(middle->size(), point.size())};
     for (Eigen::Index k = 0; k < point.size(); ++k) {
-      seen += seeds;
       const auto below = mean_features(recorded, seen, seeds);
       seen += seeds;
       const auto above = mean_features(recorded, seen, seeds);
+      seen += seeds;
       const double apart = point.with(k, point.value()[k] + point.step(k)).value()[k] -
                            point.with(k, point.value()[k] - point.step(k)).value()[k];
       if (!below || !above || !(apart > 0)) {
