@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <numbers>
@@ -309,9 +310,17 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       effects.push_back(loss_effect<EffectModel>(id, inside->middle,
                                                  0.5 * BoundingVolumeHierarchy(body.mesh).bounds().diagonal().norm(),
                                                  "in the " + body.name));
-      effects.push_back(inflow_effect<EffectModel>(
-          first * inside->middle + 0.08 * up, static_cast<Origin>(recording.bodies.size()), "above the " + body.name,
-          TimeWindow{.from = begin + 0.3 * seconds}, 0.3 * seconds));
+      const double out = 0.45 * inside->rim_radius();
+      for (const auto& [where, off] : std::initializer_list<std::pair<const char*, Vector3<double>>>{
+               {"above the ", Vector3<double>::Zero()},
+               {"on one side above the ", out * across},
+               {"on the other side above the ", -out * across},
+               {"behind, above the ", out * along},
+               {"in front, above the ", -out * along}}) {
+        effects.push_back(inflow_effect<EffectModel>(first * inside->middle + 0.08 * up + off,
+                                                     static_cast<Origin>(recording.bodies.size()), where + body.name,
+                                                     TimeWindow{.from = begin + 0.3 * seconds}, 0.3 * seconds));
+      }
       of_bodies.push_back(obstacle_effect<EffectModel>(id, inside->floor + half * inside->up, "in the " + body.name));
     }
   }
