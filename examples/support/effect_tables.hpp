@@ -100,12 +100,11 @@ struct EffectScore {
 
   /// The strength that is found over the hidden one, where the very effect is named and has one number; else NaN.
   double strength_ratio() const {
-    const nlohmann::json& truth = result->at("truth");
-    return comparable() ? number_at(*result, "/strength") / strength_in_model(truth)
+    return comparable() ? number_at(*result, "/strength") / strength_in_model()
                         : std::numeric_limits<double>::quiet_NaN();
   }
   bool interval_holds() const {
-    const double strength = strength_in_model(result->at("truth"));
+    const double strength = strength_in_model();
     return number_at(*result, "/interval_90/0") <= strength && strength <= number_at(*result, "/interval_90/1");
   }
   bool comparable() const {
@@ -119,11 +118,19 @@ struct EffectScore {
   }
 
  private:
-  /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own.
-  static double strength_in_model(const nlohmann::json& truth) {
+  /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own. A wall acts on a layer of
+  /// particles the stronger the thinner that is, see EffectReality.
+  double strength_in_model() const {
+    const nlohmann::json& truth = result->at("truth");
     const double strength = number_at(truth, "/strength");
+    const double layers = 1e3 * EffectReality::spacing_of_strengths / number_at(*result, "/settings/model_spacing_mm");
     const std::string name = truth.at("effect");
-    return name == "gravity" ? 9.81 * (1 + strength) : name == "fill" ? 1 + strength : strength;
+    return name == "gravity"         ? 9.81 * (1 + strength)
+           : name == "fill"          ? 1 + strength
+           : name == "wall_friction" ? layers * strength
+           : name == "wall_adhesion" ? layers * layers * strength
+           : name == "obstacle"      ? 1e-3 * strength
+                                     : strength;
   }
 };
 
