@@ -300,8 +300,13 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       const Vector3<double> in = (inside->mouth() - places.lip).normalized();
       of_bodies.push_back(
           obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + body.name));
-      const Vector3<double> on_wall = places.lip - 0.5 * inside->up.dot(places.lip - inside->floor) * inside->up;
-      of_bodies.push_back(leak_effect<EffectModel>(id, on_wall + 0.004 * in, -0.014 * in, "wall of the " + body.name));
+      // where liquid is while it is poured: holes of other heights let out jets that do not overlap
+      const double wall = inside->up.dot(places.lip - inside->floor);
+      for (const auto& [where, share] : std::initializer_list<std::pair<const char*, double>>{
+               {"foot of the wall of the ", 0.2}, {"wall of the ", 0.5}, {"wall below the rim of the ", 0.8}}) {
+        const Vector3<double> on_wall = places.lip - (1 - share) * wall * inside->up;
+        of_bodies.push_back(leak_effect<EffectModel>(id, on_wall + 0.004 * in, -0.014 * in, where + body.name));
+      }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(
             {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, body.name));

@@ -260,6 +260,7 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
       detail::plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
                            "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
+  effect.place_tolerance = 0.02;
   effect.where = std::move(where);
   return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
                                    [body, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
