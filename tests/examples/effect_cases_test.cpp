@@ -29,7 +29,7 @@ using namespace example;
 
 namespace {
 
-constexpr std::array case_ranges{CaseRange::Develop, CaseRange::Report};
+constexpr std::array both_ranges{CaseRange::Develop, CaseRange::Report};
 constexpr std::array kinds_of_effects{CaseKind::Moderate, CaseKind::Weak, CaseKind::Outside, CaseKind::Measurement};
 
 /// One particle, as a force sees it.
@@ -92,7 +92,7 @@ TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is
   std::set<std::uint32_t> seeds;
   std::size_t cases = 0;
   std::map<CaseRange, std::set<std::size_t>> scenarios;
-  for (const CaseRange range : case_ranges) {
+  for (const CaseRange range : both_ranges) {
     for (const CaseKind kind :
          {CaseKind::Moderate, CaseKind::Weak, CaseKind::Nothing, CaseKind::Outside, CaseKind::Measurement}) {
       for (int number = 0; number < 100; ++number) {
@@ -118,7 +118,7 @@ TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is
 }
 
 TEST_CASE("effect cases: each effect comes equally often and in all scenarios, as strong as its kind says") {
-  for (const CaseRange range : case_ranges) {
+  for (const CaseRange range : both_ranges) {
     for (const CaseKind kind : kinds_of_effects) {
       const std::vector<EffectEntry>& entries = entries_of(kind);
       const std::size_t rounds = 20 * scenarios_of(range).size();
