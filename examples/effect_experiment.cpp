@@ -63,7 +63,7 @@ int main(int count, char** values) {
     std::erase_if(cases, [&](const example::EffectCase& each) {
       return !scenarios.empty() && std::find(scenarios.begin(), scenarios.end(), each.scenario) == scenarios.end();
     });
-    // cases of one scenario after the other, which find their runs in memory
+    // one scenario after the other: what is stopped has few dictionaries of runs begun
     std::stable_sort(cases.begin(), cases.end(), [](const auto& a, const auto& b) { return a.scenario < b.scenario; });
     example::EffectExperiment experiment(options);
     experiment.record(cases);

@@ -170,6 +170,7 @@ class MissingEffectSearch {
 
   MissingEffect find() {
     MissingEffect result;
+    discrepancy_ = {};  // references are judged without any
     discrepancy_ = discrepancy();
     bool explained = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
@@ -352,6 +353,7 @@ class MissingEffectSearch {
     return most;
   }
 
+  /// By the energy that effects have in the dictionary, over all recordings together.
   std::vector<SmallestSeen> smallest_seen(const Knowledge& known) const {
     std::vector<SmallestSeen> result;
     std::vector<double> chaos;
