@@ -45,12 +45,10 @@ Pour::Scene small_pour() {
     poses.push_back({time, Pose{tilted, Vector3<double>(-0.06, 0.03, 0.11)}});
   }
   scene.motion = {PoseTrack(poses), PoseTrack()};
-  scene.start = [cup_motion = scene.motion[0]](double spacing, double fill_factor) {
-    SimulatorSettings settings;
-    settings.spacing = spacing;
+  scene.start = [cup_motion = scene.motion[0]](SimulatorSettings settings, double fill_factor) {
     settings.threads = {1};
     settings.liquid.surface_tension = 0;
-    Model model(for_tracking(settings));
+    Model model(settings);
     const BodyId cup = model.add_body("cup", Cup{0.025, 0.03, 0.07, 0.003}, PoseTrack(cup_motion.at(0)));
     model.add_body("pan", CylinderInside{0.08, 0.03, 0.003, Face::PositiveZ});
     fill(model, cup, FillAmount::fraction(0.6 * fill_factor));

@@ -91,8 +91,10 @@ inline std::string fingerprint(const decant::Recording& recording, const Recorde
   }
   number(model.settings().spacing);
   number(model.settings().jitter);
-  for (const double each : model.settings().tolerated_spacings) {
-    number(each);
+  for (const decant::Discretisation& each : model.settings().discretisations) {
+    for (const double factor : {each.spacing, each.support, each.precision, each.drawing}) {
+      number(factor);
+    }
   }
   std::string digits(16, '0');
   for (std::size_t k = 0; k < digits.size(); ++k) {
@@ -395,9 +397,10 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
   }
   auto start_of = std::make_shared<Recording>(recording);
   start_of->liquid.surface_tension = 0;
-  scene.start = [start_of](double spacing, double fill) {
+  scene.start = [start_of](const SimulatorSettings& solver, double fill) {
     TrackingOptions tracking;
-    tracking.spacing = spacing;
+    tracking.spacing = solver.spacing;
+    tracking.solver = solver;
     tracking.threads = 1;
     tracking.initial_amount_factor = fill;
     return model_of<EffectParts<float>>(*start_of, tracking);

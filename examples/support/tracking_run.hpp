@@ -43,6 +43,7 @@ struct TrackingOptions {
   bool keep_overlays = false;                     ///< for reports; takes some MB of memory per hundred frames
   double initial_amount_factor = 1;               ///< the model starts with so much of what the recording says, >= 0
   decant::Slip source_slip = decant::Slip::Free;  ///< how liquid goes along what it is poured from
+  decant::SimulatorSettings solver = decant::for_tracking({});  ///< its spacing, liquid and gravity are not used
   /// What the tracker gets to see of a frame and camera instead of the recording's masks, which forecasts are scored
   /// against in any case.
   std::function<std::optional<decant::Mask>(const decant::Recording&, std::size_t frame, std::size_t camera)> masks{};
@@ -140,12 +141,12 @@ void fill_as_recorded(const decant::Recording& recording, double factor, Model& 
 template <class Parts>
 decant::Simulator<Parts> model_of(const decant::Recording& recording, const TrackingOptions& options) {
   using namespace decant;
-  SimulatorSettings settings;
+  SimulatorSettings settings = options.solver;
   settings.spacing = options.spacing;
   settings.gravity = recording.gravity;
   settings.liquid = {recording.liquid.density, recording.liquid.viscosity, recording.liquid.surface_tension};
   settings.threads = {options.threads};
-  Simulator<Parts> model(for_tracking(settings));
+  Simulator<Parts> model(settings);
   for (const recording::Body& body : recording.bodies) {
     const Slip slip = body.role == recording::Role::Source ? options.source_slip : Slip::Free;
     const BodyId id =

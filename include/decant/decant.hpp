@@ -81,6 +81,7 @@
 #include <decant/discovery/silhouette_gap.hpp>
 #include <decant/discovery/silhouette_series.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
+#include <decant/discovery/smallest_seen.hpp>
 #include <decant/discovery/strength_profile.hpp>
 #include <decant/force/back_pressure.hpp>
 #include <decant/force/body_acceleration.hpp>

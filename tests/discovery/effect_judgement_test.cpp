@@ -161,7 +161,7 @@ TEST_CASE("effect judgement: several recordings have one strength") {
   CHECK_THROWS_WITH(judge_effects(effects, {first, second}, usual_chance()), decant_test::contains("first one"));
 }
 
-TEST_CASE("effect judgement: chance is what the worst of the draws does, and a little more") {
+TEST_CASE("effect judgement: chance is what nearly all draws do, and a little more") {
   std::vector<EffectEvidence> draws;
   for (int k = 0; k < 6; ++k) {
     draws.push_back(evidence(1 + 0.1 * k, {0.01 * k, 0.05}, {0.004 * k, 0}));
@@ -169,12 +169,19 @@ TEST_CASE("effect judgement: chance is what the worst of the draws does, and a l
   JudgementSettings settings;
   settings.distance_factor = 1.1;
   settings.fall_factor = settings.gap_factor = 2;
+  settings.quantile = 0.95;  // three quarters of the way from the fifth to the sixth
   const ChanceLevel level = chance_level({draws}, settings);
   CHECK(level.distance == Approx(1.1 * 1.25));
-  CHECK(level.largest_distance == Approx(1.65));
-  CHECK(level.fall == Approx(2 * 0.05 / 0.95));  // where least is left
-  CHECK(level.overlap == Approx(2 * 0.02 / 0.4));
+  CHECK(level.largest_distance == Approx(1.1 * 1.475));
+  CHECK(level.fall == Approx(2 * std::lerp(0.05 / 1.05, 0.05 / 0.95, 0.75)));  // largest where least is left
+  CHECK(level.overlap == Approx(2 * 0.019 / 0.4));
   CHECK(level.blurred == 0);
+  settings.quantile = 1;
+  CHECK(chance_level({draws}, settings).largest_distance == Approx(1.1 * 1.5));
+  settings.quantile = 0;
+  CHECK(chance_level({draws}, settings).largest_distance == Approx(1.1));
+  settings.quantile = 1.1;
+  CHECK_THROWS_WITH(chance_level({draws}, settings), decant_test::contains("quantile"));
   draws.resize(4);
   CHECK_THROWS_WITH(chance_level({draws}), decant_test::contains("at least 5"));
 }

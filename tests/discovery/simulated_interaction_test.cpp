@@ -57,12 +57,10 @@ Pour::Scene pour_scene(const Vector3<double>& aside = Vector3<double>::Zero(), d
                         Vector3<double>(-0.05, 0, 0.12) + aside}});
   }
   scene.motion = {PoseTrack(samples), PoseTrack(Pose{Eigen::Quaterniond::Identity(), aside})};
-  scene.start = [first = scene.motion](double spacing, double fill) {
-    SimulatorSettings settings;
-    settings.spacing = spacing;
+  scene.start = [first = scene.motion](SimulatorSettings settings, double fill) {
     settings.threads = {1};
     settings.liquid.surface_tension = 0;
-    PourModel model(for_tracking(settings));
+    PourModel model(settings);
     const BodyId cup = model.add_body("cup", Cup{0.025, 0.03, 0.07, 0.003}, PoseTrack(first[0].at(0)));
     model.add_body("pan", CylinderInside{0.08, 0.03, 0.003, Face::PositiveZ}, PoseTrack(first[1].at(0)));
     decant::fill(model, cup, FillAmount::fraction(0.6 * fill));
@@ -353,9 +351,9 @@ TEST_CASE("simulated interaction: obstacles go with their body, and necks hold l
 TEST_CASE("simulated interaction: what is tolerated is drawn within its tolerance, by the seed") {
   const Pour pour = pour_of();
   double most_delay = 0, most_pull = 0;
-  int coarser = 0, finer = 0;
+  int coarser = 0, finer = 0, sharper = 0, more_precise = 0, thinner = 0;
   for (std::uint32_t seed = 0; seed < 40; ++seed) {
-    const auto [changes, spacing] = pour.changes({{}, seed, true});
+    const auto [changes, discretisation] = pour.changes({{}, seed, true});
     CHECK(pour.changes({{}, seed, true}).first.pose_delay == changes.pose_delay);
     CHECK(std::abs(changes.pose_delay) <= 0.008);
     CHECK(std::abs(changes.fill - 1) <= 0.02);
@@ -363,10 +361,16 @@ TEST_CASE("simulated interaction: what is tolerated is drawn within its toleranc
     // taken account of by templates
     CHECK(changes.camera_shift.norm() == 0);
     CHECK(changes.mask_growth == 0);
-    coarser += spacing > 1 ? 1 : 0;
-    finer += spacing < 1 ? 1 : 0;
+    coarser += discretisation.spacing > 1 ? 1 : 0;
+    finer += discretisation.spacing < 1 ? 1 : 0;
+    sharper += discretisation.support < 1 ? 1 : 0;
+    more_precise += discretisation.precision > 1 ? 1 : 0;
+    thinner += discretisation.drawing < 1 ? 1 : 0;
     most_delay = std::max(most_delay, std::abs(changes.pose_delay));
     PourModel model = pour.started({{}, seed, true});
+    CHECK(model.spacing() == Approx(discretisation.spacing * pour.settings().spacing));
+    CHECK(model.settings().support_in_spacings == Approx(2 * discretisation.support));
+    CHECK(model.settings().courant_number == Approx(1.6 / discretisation.precision));
     const auto& pull = model.force<BodyAcceleration<float>>().pull;
     CHECK(pull.cwiseAbs().maxCoeff() <= 0.03F);
     most_pull = std::max(most_pull, static_cast<double>(std::abs(pull.x())));
@@ -375,8 +379,11 @@ TEST_CASE("simulated interaction: what is tolerated is drawn within its toleranc
   CHECK(most_pull > 0.02);
   CHECK(coarser > 5);
   CHECK(finer > 5);
-  const auto [changes, spacing] = pour.changes({{}, 3, false});
-  CHECK(spacing == 1);
+  CHECK(sharper > 5);
+  CHECK(more_precise > 5);
+  CHECK(thinner > 5);
+  const auto [changes, discretisation] = pour.changes({{}, 3, false});
+  CHECK(discretisation == Discretisation{});
   CHECK(changes.of_model.empty());
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <string>
@@ -34,11 +35,12 @@ struct ChanceLevel {
 /// as what a solver has of its own, and that is the scale of what is left: so is the F-test's of linear models.
 inline double relative_fall(double before, double after) noexcept { return (before - after) / std::max(after, 1e-12); }
 
-/// Factors on what draws do.
+/// What is chance: factors on what draws do, by a quantile of them.
 struct JudgementSettings {
-  double distance_factor = 1.6;  ///< >= 1: a solver is farther from reality than its own runs are from each other
-  double fall_factor = 1.3;      ///< on the worst of them, >= 1
-  double gap_factor = 1.3;       ///< on the worst of them, >= 1
+  double quantile = 0.98;        ///< 0 .. 1; the largest of many is the larger the more there are
+  double distance_factor = 1.3;  ///< >= 1: a solver is farther from reality than its own runs are from each other
+  double fall_factor = 1.3;      ///< >= 1
+  double gap_factor = 1.3;       ///< >= 1
   double least_share = 0.6;      ///< of what is reducible an effect has to explain, or bring it down to chance; 0 .. 1
   double vote_margin = 0.15;     ///< families this close to the best are not told apart; 0 .. 1
 };
@@ -117,6 +119,18 @@ inline JointEvidence joined(const std::vector<EffectEvidence>& of) {
   return result;
 }
 
+/// Between the two values next to it; of none 0.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) {
+    return 0;
+  }
+  std::sort(values.begin(), values.end());
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return std::lerp(values[below], values[above], place - static_cast<double>(below));
+}
+
 inline double largest(const std::vector<double>& values) noexcept {
   double best = 0;
   for (const double value : values) {
@@ -136,25 +150,32 @@ inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& 
     count = std::min(count, each.size());
   }
   expects(count >= 5, "chance_level: draws", "at least 5", count);
-  ChanceLevel level;
+  expects(settings.quantile >= 0 && settings.quantile <= 1, "JudgementSettings: quantile", "0 .. 1", settings.quantile);
+  std::vector<double> distance, fall, overlap, blurred;  // by draw, the last three the most of any effect
   for (std::size_t draw = 0; draw < count; ++draw) {
     std::vector<EffectEvidence> of;
     for (const auto& each : draws) {
       of.push_back(each[draw]);
     }
     const detail::JointEvidence joint = detail::joined(of);
-    const auto recordings = static_cast<double>(of.size());
-    level.distance += settings.distance_factor * joint.distance / static_cast<double>(count);
-    level.largest_distance = std::max(level.largest_distance, settings.distance_factor * joint.distance);
+    distance.push_back(joint.distance);
+    fall.push_back(0);
     for (const auto& profile : joint.profile) {
       if (profile) {
-        const double left = joint.distance - profile->improvement() / recordings;
-        level.fall = std::max(level.fall, settings.fall_factor * relative_fall(joint.distance, left));
+        const double left = joint.distance - profile->improvement() / static_cast<double>(of.size());
+        fall.back() = std::max(fall.back(), relative_fall(joint.distance, left));
       }
     }
-    level.overlap = std::max(level.overlap, settings.gap_factor * detail::largest(joint.overlap));
-    level.blurred = std::max(level.blurred, settings.gap_factor * detail::largest(joint.blurred));
+    overlap.push_back(detail::largest(joint.overlap));
+    blurred.push_back(detail::largest(joint.blurred));
   }
+  ChanceLevel level;
+  level.distance =
+      settings.distance_factor * std::accumulate(distance.begin(), distance.end(), 0.0) / static_cast<double>(count);
+  level.largest_distance = settings.distance_factor * detail::quantile(distance, settings.quantile);
+  level.fall = settings.fall_factor * detail::quantile(fall, settings.quantile);
+  level.overlap = settings.gap_factor * detail::quantile(overlap, settings.quantile);
+  level.blurred = settings.gap_factor * detail::quantile(blurred, settings.quantile);
   return level;
 }
 

@@ -31,6 +31,7 @@
 #include <decant/discovery/effect_refinement.hpp>
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/smallest_seen.hpp>
 #include <decant/hypothesis/executor.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -111,13 +112,6 @@ struct GapChange {
   double share() const noexcept { return (before - after) / std::max(before - noise, 1e-12); }
 };
 
-/// The least strengths of an effect's component, to both sides of its base, that would have been told from chance in
-/// about nine of ten recordings; NaN where none would have been up to the end of the range.
-struct SmallestSeen {
-  std::size_t effect = 0, component = 0;
-  double below = std::numeric_limits<double>::quiet_NaN(), above = std::numeric_limits<double>::quiet_NaN();
-};
-
 /// What was found.
 struct MissingEffect {
   Verdict verdict = Verdict::Nothing;
@@ -182,7 +176,9 @@ class MissingEffectSearch {
           result.where.push_back(find_disagreements(each.features(), beyond_chance(each), settings_.threshold));
         }
         result.judgement = judgement;
-        result.smallest_seen = smallest_seen(known);
+        const std::vector<double>& shares = settings_.dictionary.shares;
+        result.smallest_seen =
+            smallest_seen(effects(), known.recorded, known.chance, *std::min_element(shares.begin(), shares.end()));
       }
       if (judgement.verdict == Verdict::Nothing) {
         break;
@@ -353,65 +349,6 @@ class MissingEffectSearch {
     return most;
   }
 
-  /// By the energy that effects have in the dictionary, over all recordings together.
-  std::vector<SmallestSeen> smallest_seen(const Knowledge& known) const {
-    std::vector<SmallestSeen> result;
-    std::vector<double> chaos;
-    for (const RecordedEvidence& each : known.recorded) {
-      chaos.push_back(each.chaos());
-    }
-    // Three times the strength at which energy is what chance may explain: a recording has noise of its own, and a
-    // curve does not follow all that happens at strengths that were not simulated. Measured on thrown balls, for nine
-    // of ten.
-    constexpr double margin = 3 * 3;
-    const double needed =
-        margin * known.chance.fall * known.chance.distance * static_cast<double>(known.recorded.size());
-    for (std::size_t effect = 0; effect < effects().size(); ++effect) {
-      std::vector<EffectCurve> curves;  // by recording
-      for (const RecordedEvidence& each : known.recorded) {
-        if (auto curve = each.curve(effect)) {
-          curves.push_back(std::move(*curve));
-        }
-      }
-      if (curves.size() < known.recorded.size()) {
-        continue;
-      }
-      for (std::size_t component = 0; component < effects()[effect].components.size(); ++component) {
-        const EffectComponent& of = effects()[effect].components[component];
-        const auto energy = [&](double strength) {
-          Eigen::VectorXd at = effects()[effect].base();
-          at[static_cast<Eigen::Index>(component)] = strength;
-          double sum = 0;
-          for (std::size_t k = 0; k < curves.size(); ++k) {
-            sum += curves[k].energy(at, chaos[k]);
-          }
-          return sum;
-        };
-        const auto least = [&](double end) {
-          const auto at = [&](double share) { return of.base + share * (end - of.base); };
-          if (end == of.base || energy(end) <= needed) {
-            return std::numeric_limits<double>::quiet_NaN();
-          }
-          // Below what was simulated, energy grows with the square of the strength at first, and less from where things
-          // are off by more than a feature's size on: so it is at least so large.
-          const double simulated =
-              *std::min_element(settings_.dictionary.shares.begin(), settings_.dictionary.shares.end());
-          if (const double there = energy(at(simulated)); there > needed) {
-            return at(simulated * std::sqrt(needed / there));
-          }
-          double unseen = simulated, seen = 1;
-          for (int halving = 0; halving < 20; ++halving) {
-            const double half = 0.5 * (unseen + seen);
-            (energy(at(half)) > needed ? seen : unseen) = half;
-          }
-          return at(seen);
-        };
-        result.push_back({effect, component, least(of.low), least(of.high)});
-      }
-    }
-    return result;
-  }
-
   /// Deviations of the recording, each over what draws have there.
   static Eigen::VectorXd beyond_chance(const RecordedEvidence& recorded) {
     Eigen::VectorXd square = Eigen::VectorXd::Zero(recorded.space().features());
@@ -427,7 +364,7 @@ class MissingEffectSearch {
   /// @param before the distance to the model without any.
   std::vector<Refined> refine_best(const Judgement& judgement, const Knowledge& known,
                                    const std::vector<RefinedEffect>& found, double before) {
-    std::vector<EffectPoint> points;
+    std::vector<Candidate> candidates;
     std::map<std::string, int> instances;
     for (const EffectStanding& standing : judgement.standings) {
       const Effect& effect = effects()[standing.effect];
@@ -435,23 +372,25 @@ class MissingEffectSearch {
                                         [&](const RefinedEffect& other) { return other.effect == standing.effect; });
       // of one family the best one, and of an effect in several places two of them
       const int most = effect.place ? 2 : 1;
-      if (points.size() < static_cast<std::size_t>(settings_.refined) && !is_found && standing.improvement > 0 &&
+      if (candidates.size() < static_cast<std::size_t>(settings_.refined) && !is_found && standing.improvement > 0 &&
           instances[effect.answer()] < most) {
         ++instances[effect.answer()];
-        EffectPoint& point = points.emplace_back();
+        EffectPoint& point = candidates.emplace_back().point;
         for (const RefinedEffect& each : found) {
           point.add(effects()[each.effect], each.effect, each.applied());
         }
         point.add(effect, standing.effect, {standing.effect, standing.strength, {}});
       }
     }
-    std::vector<Views> views(points.size());
-    std::vector<double> expected(points.size());  // distances after a step, by the linear model that it was made with
-    for (int round = 0; round < settings_.refinement_rounds && !points.empty(); ++round) {
-      step_all(points, views, expected, known, static_cast<std::uint32_t>(5001 + 1000 * round));
+    for (int round = 0; round < settings_.refinement_rounds && !candidates.empty(); ++round) {
+      step_all(candidates, known, static_cast<std::uint32_t>(5001 + 1000 * round));
       if (round + 1 < settings_.refinement_rounds) {
-        keep_promising(points, views, expected, known.chance);
+        keep_promising(candidates, known.chance);
       }
+    }
+    std::vector<EffectPoint> points;
+    for (const Candidate& each : candidates) {
+      points.push_back(each.point);
     }
     const std::vector<double> distance = distances(points, known);
     const auto best = static_cast<std::size_t>(std::min_element(distance.begin(), distance.end()) - distance.begin());
@@ -464,7 +403,7 @@ class MissingEffectSearch {
       one.distance = distance[k];
       one.share = (before - one.distance) / std::max(before - known.chance.distance, 1e-12);
       const Eigen::VectorXd deviation =
-          k == best ? deviations(points[k], views[k], known)
+          k == best ? deviations(points[k], candidates[k].views, known)
                     : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);
@@ -500,38 +439,41 @@ class MissingEffectSearch {
     return point.size() <= 2 ? middle_seeds() : (middle_seeds() + 1) / 2;
   }
 
+  /// An effect on its way to where it explains most.
+  struct Candidate {
+    EffectPoint point{};
+    Views views{};         ///< of the last step
+    double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
+    bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
+  };
+
   /// Leaves the best one, the next best one as its rival, and all others that may come near it.
-  void keep_promising(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
-                      const ChanceLevel& chance) const {
-    std::vector<double> sorted = expected;
+  static void keep_promising(std::vector<Candidate>& candidates, const ChanceLevel& chance) {
+    std::vector<double> sorted;
+    for (const Candidate& each : candidates) {
+      sorted.push_back(each.expected);
+    }
     std::sort(sorted.begin(), sorted.end());
     const double rival = sorted[std::min<std::size_t>(1, sorted.size() - 1)];
-    std::size_t kept = 0;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      if (expected[k] <= rival || relative_fall(expected[k], sorted.front()) < 3 * chance.fall) {
-        std::swap(points[kept], points[k]);
-        std::swap(views[kept], views[k]);
-        std::swap(expected[kept], expected[k]);
-        ++kept;
-      }
-    }
-    points.resize(kept);
-    views.resize(kept);
-    expected.resize(kept);
+    std::erase_if(candidates, [&](const Candidate& each) {
+      return each.expected > rival && relative_fall(each.expected, sorted.front()) >= 3 * chance.fall;
+    });
   }
 
-  /// One step for each of the points, all runs side by side. A point at which runs fail stays.
-  /// @param expected what should be left after the step; infinite where runs fail.
-  void step_all(std::vector<EffectPoint>& points, std::vector<Views>& views, std::vector<double>& expected,
-                const Knowledge& known, std::uint32_t seed) {
+  /// One step for each of the candidates that is not settled, all runs side by side. A point at which runs fail stays.
+  void step_all(std::vector<Candidate>& candidates, const Knowledge& known, std::uint32_t seed) {
     std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
     const auto ask = [&](const Interaction<Model>& of, const EffectPoint& point, std::size_t seeds) {
       for (std::size_t k = 0; k < seeds; ++k) {
         runs.emplace_back(&of, point.run(seed + static_cast<std::uint32_t>(runs.size())));
       }
     };
-    for (const EffectPoint& point : points) {
+    for (const Candidate& each : candidates) {
+      const EffectPoint& point = each.point;
       for (const Interaction<Model>& of : learn_) {
+        if (each.settled) {
+          break;
+        }
         ask(of, point, middle_seeds());
         for (Eigen::Index k = 0; k < point.size(); ++k) {
           ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
@@ -541,35 +483,49 @@ class MissingEffectSearch {
     }
     const std::vector<Series> seen = predictions(runs);
     const Series* next = seen.data();
-    std::vector<Eigen::VectorXd> recorded_features;
-    for (const RecordedEvidence& recorded : known.recorded) {
-      recorded_features.push_back(recorded.recorded_features());
-    }
-    for (std::size_t which = 0; which < points.size(); ++which) {
-      views[which].clear();
-      for (const RecordedEvidence& recorded : known.recorded) {
-        if (auto view = view_of(points[which], recorded, next)) {
-          views[which].push_back(std::move(*view));
-        }
-        next += middle_seeds() + slope_seeds(points[which]) * static_cast<std::size_t>(2 * points[which].size());
-      }
-      if (views[which].size() < known.recorded.size()) {
-        views[which].clear();
-        expected[which] = std::numeric_limits<double>::infinity();
+    for (Candidate& each : candidates) {
+      if (each.settled) {
         continue;
       }
-      const Eigen::VectorXd move = refinement(points[which], views[which], recorded_features);
-      expected[which] = 0;
-      for (std::size_t k = 0; k < views[which].size(); ++k) {
-        const RefinementView& view = views[which][k];
-        const Eigen::VectorXd left = recorded_features[k] - view.middle - view.slope * move;
-        expected[which] +=
-            view.space->distance(view.space->standardised_difference(left)) / static_cast<double>(views[which].size());
+      each.views.clear();
+      for (const RecordedEvidence& recorded : known.recorded) {
+        if (auto view = view_of(each.point, recorded, next)) {
+          each.views.push_back(std::move(*view));
+        }
+        next += middle_seeds() + slope_seeds(each.point) * static_cast<std::size_t>(2 * each.point.size());
       }
-      const Eigen::VectorXd value = points[which].value() + move;
-      for (Eigen::Index k = 0; k < points[which].size(); ++k) {
-        points[which] = points[which].with(k, value[k]);
+      if (each.views.size() < known.recorded.size()) {
+        each.views.clear();
+        each.expected = std::numeric_limits<double>::infinity();
+        each.settled = true;
+      } else {
+        step(each, known);
       }
+    }
+  }
+
+  /// By its views.
+  void step(Candidate& candidate, const Knowledge& known) const {
+    std::vector<Eigen::VectorXd> recorded;
+    for (const RecordedEvidence& each : known.recorded) {
+      recorded.push_back(each.recorded_features());
+    }
+    const Eigen::VectorXd move = refinement(candidate.point, candidate.views, recorded);
+    double before = 0;
+    candidate.expected = 0;
+    for (std::size_t k = 0; k < candidate.views.size(); ++k) {
+      const RefinementView& view = candidate.views[k];
+      const auto share = [&](const Eigen::VectorXd& off) {
+        return view.space->distance(view.space->standardised_difference(off)) /
+               static_cast<double>(candidate.views.size());
+      };
+      before += share(recorded[k] - view.middle);
+      candidate.expected += share(recorded[k] - view.middle - view.slope * move);
+    }
+    candidate.settled = relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
+    const Eigen::VectorXd value = candidate.point.value() + move;
+    for (Eigen::Index k = 0; k < candidate.point.size(); ++k) {
+      candidate.point = candidate.point.with(k, value[k]);
     }
   }
 
