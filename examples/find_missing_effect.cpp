@@ -121,16 +121,16 @@ int main(int count, char** values) {
                    .find();
     }
     progress.finish();
-    std::printf("%s\n%s%s%s", example::missing_effect_sentence(effects, result).c_str(),
+    std::printf("%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
-                example::candidates_table(effects, result).text().c_str());
+                example::candidates_table(result.judged, result).text().c_str());
     if (result.verdict == decant::Verdict::Nothing) {
       std::printf("What would have been seen in about nine of ten such recordings:\n%s",
-                  example::smallest_seen_table(effects, result).text().c_str());
+                  example::smallest_seen_table(result.judged, result).text().c_str());
     }
     example::in_first_process(executor, [&] {
       if (!json_file.empty()) {
-        nlohmann::json json = example::missing_effect_json(effects, result, kept.front()->recording.gravity);
+        nlohmann::json json = example::missing_effect_json(result.judged, result, kept.front()->recording.gravity);
         json["seconds"] = 1e-3 * milliseconds;
         json["spacing_mm"] = spacing_mm;
         json["references"] = reference_folders.size();

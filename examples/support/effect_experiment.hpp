@@ -132,7 +132,7 @@ class EffectExperiment {
           decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs, options_.search)
               .find();
     }
-    nlohmann::json json = missing_effect_json(kept[0].model.effects(), found, kept[0].recording.gravity);
+    nlohmann::json json = missing_effect_json(found.judged, found, kept[0].recording.gravity);
     json["status"] = "ok";
     json["seconds"] = 1e-3 * milliseconds;
     json["runs_computed"] = computed;

@@ -56,7 +56,7 @@ inline std::string components_text(const Eigen::VectorXd& values) {
 
 inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedEffect& found,
                                   const decant::Vector3<double>& gravity) {
-  const decant::Effect& effect = effects.at(found.effect);
+  const decant::Effect& effect = effects.at(found.judged);
   nlohmann::json json = {{"effect", effect.name},
                          {"where", effect.where},
                          {"strength", components_json(found.strength)},
@@ -86,7 +86,7 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
 
 /// In words, such as "viscosity 9e-4 m^2/s".
 inline std::string effect_words(const Effects& effects, const decant::RefinedEffect& found) {
-  const decant::Effect& effect = effects.at(found.effect);
+  const decant::Effect& effect = effects.at(found.judged);
   std::string text = effect.words() + " " + components_text(found.strength);
   text += effect.unit.empty() ? "" : " ";
   text += effect.unit;
@@ -105,7 +105,7 @@ inline std::string effect_words(const Effects& effects, const decant::RefinedEff
 
 /// The effect's C++ with its strengths, place and times.
 inline std::string effect_code(const Effects& effects, const decant::RefinedEffect& found) {
-  const decant::Effect& effect = effects.at(found.effect);
+  const decant::Effect& effect = effects.at(found.judged);
   std::string code;
   const decant::TimeWindow window = found.window.value_or(effect.window.value_or(decant::TimeWindow{}));
   Eigen::Index k = 0;
@@ -179,7 +179,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
     }
   } else {
     for (const decant::RefinedEffect& each : result.found) {
-      json["effect"].push_back(effects.at(each.effect).name);
+      json["effect"].push_back(effects.at(each.judged).name);
     }
   }
   for (const decant::RefinedEffect& each : result.found) {
@@ -256,7 +256,7 @@ inline decant::Table candidates_table(const std::vector<decant::Effect>& effects
                                  result.judgement.has_gap() ? fixed_text(100 * each.share, 0) : "",
                                  fixed_text(each.vote, 2)};
     const auto refined = std::find_if(result.refined.begin(), result.refined.end(),
-                                      [&](const auto& other) { return other.effect == each.effect; });
+                                      [&](const auto& other) { return other.judged == each.effect; });
     const bool is = refined != result.refined.end();
     row.push_back(is ? detail::components_text(refined->strength) : "");
     row.push_back(is ? fixed_text(refined->distance, 2) : "");

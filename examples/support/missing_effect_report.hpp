@@ -107,7 +107,7 @@ inline decant::BarChart candidates_chart(const Effects& effects, const decant::M
   for (const decant::EffectStanding& each : result.judgement.standings) {
     if (chart.groups.size() < 8) {
       const auto refined = std::find_if(result.refined.begin(), result.refined.end(),
-                                        [&](const auto& other) { return other.effect == each.effect; });
+                                        [&](const auto& other) { return other.judged == each.effect; });
       chart.groups.push_back(effects.at(each.effect).name);
       chart.bars.front().heights.push_back(
           100 * std::max(0.0, refined != result.refined.end() ? refined->share : each.share));
@@ -162,7 +162,7 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
 inline void write_missing_effect_report(const std::string& file,
                                         const std::vector<const RecordedInteraction*>& interactions, std::size_t learnt,
                                         const decant::MissingEffect& result) {
-  const std::vector<decant::Effect>& effects = interactions.front()->model.effects();
+  const std::vector<decant::Effect>& effects = result.judged;
   std::vector<detail::ComparedModel> models = detail::compared_models(effects, result);
   for (detail::ComparedModel& model : models) {
     model.views.resize(interactions.size());
@@ -177,7 +177,7 @@ inline void write_missing_effect_report(const std::string& file,
   report.paragraph(missing_effect_sentence(effects, result));
   for (const decant::RefinedEffect& each : result.found) {
     const std::string code = detail::effect_code(effects, each);
-    report.paragraph(effects[each.effect].words() + ": " + effects[each.effect].meaning + "." +
+    report.paragraph(effects[each.judged].words() + ": " + effects[each.judged].meaning + "." +
                      (code.empty() ? "" : " In the model: " + code));
   }
   report.heading("The gap");

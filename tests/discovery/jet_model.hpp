@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include <Eigen/Core>
 
 #include <decant/core/image.hpp>
+#include <decant/core/types.hpp>
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/silhouette_series.hpp>
@@ -25,6 +27,7 @@ struct Jet {
   double drag = 0, pull = 0, speed = 1, late = 0;  ///< [1/s], [m/s^2], over what is assumed, [s]
   double gust = 0;                                 ///< [m/s^2], for a while only
   int fatter = 0;                                  ///< of what is drawn [px]
+  double tap = 0, tap_x = 0, tap_y = 0;            ///< more balls, that drop from there: how many a second; [m]
 };
 
 /// @param seed of where each ball leaves the nozzle, and how fast. @param angle of the nozzle [rad].
@@ -42,6 +45,9 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
     const double own = aim + 0.05 * noise();
     balls.push_back({0.008 * k + jet.late, 0.1 + 0.004 * noise(), 0.3 + 0.004 * noise(), speed * std::cos(own),
                      speed * std::sin(own)});
+  }
+  for (int k = 0; k < static_cast<int>(std::lround(jet.tap)); ++k) {
+    balls.push_back({k / jet.tap, jet.tap_x + 0.004 * noise(), jet.tap_y + 0.004 * noise(), 0, 0});
   }
   decant::SilhouetteSeries film(160, 120, 10);
   const double step = 1.0 / 300;
@@ -76,10 +82,11 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
   return {film};
 }
 
-/// Knows of drag, a pull, the speed (which is tolerated within 1 %), poses that are late, and fat masks.
+/// Knows of drag, a pull, the speed (which is tolerated within 1 %), poses that are late, fat masks and, if it is told
+/// where it usually is, a tap.
 class JetModel {
  public:
-  explicit JetModel(double angle = 0.9) : angle_(angle) {
+  explicit JetModel(double angle = 0.9, const std::optional<decant::Vector3<double>>& tap = {}) : angle_(angle) {
     const auto add = [&](const char* name, const decant::EffectComponent& component, decant::EffectKind kind) {
       decant::Effect effect;
       effect.name = name;
@@ -93,6 +100,12 @@ class JetModel {
     add("speed", {"", 1, 0.85, 1.15, 0.01}, decant::EffectKind::Physics);
     add("late", {"", 0, -0.1, 0.1, 0.004}, decant::EffectKind::Measurement);
     add("fat", {"", 0, 0, 2, 1}, decant::EffectKind::Nuisance);
+    if (tap) {
+      add("tap", {"", 0, 0, 40}, decant::EffectKind::Physics);
+      effects_.back().place = tap;
+      effects_.back().place_tolerance = 0.1;
+      effects_.back().seen_first = decant::SeenFirst::Liquid;
+    }
   }
 
   const std::vector<decant::Effect>& effects() const noexcept { return effects_; }
@@ -107,14 +120,20 @@ class JetModel {
         strength.back() += share * effect.components[0].tolerance;
       }
     }
+    decant::Vector3<double> tap = decant::Vector3<double>::Zero();
     for (const decant::AppliedEffect& applied : run.effects) {
       strength.at(applied.effect) = applied.strength[0];
+      if (effects_[applied.effect].place) {
+        tap = applied.place.value_or(*effects_[applied.effect].place);
+      }
     }
     if (strength[0] > broken_above) {
       return {};
     }
-    return film_of({strength[0], strength[1], strength[2], strength[3], 0, static_cast<int>(strength[4])}, run.seed,
-                   angle_);
+    strength.resize(6, 0);
+    return film_of({strength[0], strength[1], strength[2], strength[3], 0, static_cast<int>(strength[4]), strength[5],
+                    tap.x(), tap.y()},
+                   run.seed, angle_);
   }
 
   double broken_above = 1e9;  ///< of drag: runs fail
@@ -123,6 +142,16 @@ class JetModel {
   double angle_;
   std::vector<decant::Effect> effects_{};
 };
-static_assert(decant::ForwardModel<JetModel>);
+static_assert(decant::ForwardModel<JetModel> && !decant::LocatingModel<JetModel>);
+
+/// Tells where a tap would be that is seen somewhere.
+class LocatingJetModel : public JetModel {
+ public:
+  using JetModel::JetModel;
+  std::optional<decant::Vector3<double>> place_of(std::size_t /*effect*/, const decant::Sighting& seen) const {
+    return decant::Vector3<double>(seen.pixel.x() / 160, (119 - seen.pixel.y()) / 160, 0);
+  }
+};
+static_assert(decant::LocatingModel<LocatingJetModel>);
 
 }  // namespace decant_test

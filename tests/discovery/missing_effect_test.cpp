@@ -19,6 +19,7 @@ using namespace decant;
 using decant_test::film_of;
 using decant_test::Jet;
 using decant_test::JetModel;
+using decant_test::LocatingJetModel;
 
 namespace {
 
@@ -126,6 +127,33 @@ TEST_CASE("missing effect: what is not in the catalogue is unexplained, and wher
   // from 0.4 s on, in windows of 0.133 s
   CHECK(first > 0.26);
   CHECK(first < 0.6);
+}
+
+TEST_CASE("missing effect: what is elsewhere than it usually is is found where recordings begin to disagree") {
+  // a tap over the empty half of the picture, and no other stream that overlaps with it
+  const Jet hidden{0, 0, 1, 0, 0, 0, 25, 0.3, 0.65};
+  const Vector3<double> usual(0.15, 0.6, 0);
+  ThreadExecutor executor{{1}};
+  const auto found = [&]<class Model>(const Model& model, std::uint32_t seed) {
+    return MissingEffectSearch<Model>({{"a", &model, film_of(hidden, seed, 0.9)}}, {}, run_jobs_on(executor)).find();
+  };
+  for (const std::uint32_t seed : {71U, 72U, 73U}) {
+    const MissingEffect lost = found(JetModel(0.9, usual), seed);
+    CHECK(lost.verdict == Verdict::Unexplained);
+    CHECK(lost.judged.size() == 6);
+    const LocatingJetModel model(0.9, usual);
+    const MissingEffect located = found(model, seed);
+    REQUIRE(located.judged.size() == 7);
+    CHECK(located.verdict == Verdict::Named);
+    REQUIRE(located.found.size() == 1);
+    const RefinedEffect& tap = located.found.front();
+    CHECK(model.effects()[tap.effect].name == "tap");
+    CHECK(tap.judged == 6);
+    REQUIRE(tap.place);
+    CHECK(tap.place->x() == Approx(0.3).margin(0.04));  // a third of the squares that are compared
+    CHECK(tap.place->y() == Approx(0.65).margin(0.04));
+    CHECK(tap.strength[0] == Approx(25).epsilon(0.2));
+  }
 }
 
 TEST_CASE("missing effect: references say how far reality is from the model where nothing is missing") {

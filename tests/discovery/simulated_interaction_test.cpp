@@ -387,6 +387,43 @@ TEST_CASE("simulated interaction: what is tolerated is drawn within its toleranc
   CHECK(changes.of_model.empty());
 }
 
+TEST_CASE("simulated interaction: what is seen somewhere has its place there, as far off as it usually is") {
+  for (const double pitch : {0.0, 0.7}) {  // of the camera, down from along y
+    INFO("pitch " << pitch);
+    Pour::Scene scene = pour_scene();
+    const double c = std::cos(pitch), s = std::sin(pitch);
+    const Eigen::Matrix3d axes = (Eigen::Matrix3d() << 1, 0, 0, 0, -s, -c, 0, c, -s).finished();
+    const Vector3<double> eye(0, -0.5 * c, 0.08 + 0.5 * s);
+    scene.cameras[0].camera_from_world.assign(scene.times.size(), {Eigen::Quaterniond(axes), -axes * eye});
+    const Pour pour = pour_of(scene);
+    const auto number = [&](const std::string& name) {
+      const auto found = std::find_if(pour.effects().begin(), pour.effects().end(),
+                                      [&](const Effect& effect) { return effect.name == name; });
+      return static_cast<std::size_t>(found - pour.effects().begin());
+    };
+    const auto& camera = scene.cameras[0];
+    const auto seen = [&](const Vector3<double>& world, std::size_t frame) {
+      return Sighting{0, camera.camera.project(camera.camera_from_world[frame] * world).pixel, scene.times[frame]};
+    };
+    // an inflow's place is in the world
+    const std::size_t inflow = number("inflow");
+    const Vector3<double> there = *pour.effects()[inflow].place + Vector3<double>(-0.04, 0, 0.03);
+    CHECK((*pour.place_of(inflow, seen(there, 2)) - there).norm() < 1e-9);
+    // of what is nearer to the camera it is told where it would be if it were as far off as usual
+    CHECK((*pour.place_of(inflow, seen(there + 0.3 * (eye - there), 2)) - there).norm() < 1e-9);
+    // a leak's place is in its container, which turns
+    const std::size_t leak = number("leak");
+    for (const std::size_t frame : {std::size_t{0}, std::size_t{3}}) {
+      const Pose cup = scene.motion[0].at(scene.times[frame]);
+      const Vector3<double> hole = *pour.effects()[leak].place + Vector3<double>(0.01, 0, 0.02);
+      CHECK((*pour.place_of(leak, seen(cup * hole, frame)) - hole).norm() < 1e-9);
+    }
+    CHECK(!pour.place_of(number("drag_linear"), seen(there, 0)));
+    CHECK(!pour.place_of(inflow, Sighting{1, {0, 0}, 0}));
+    CHECK(!pour.place_of(inflow, Sighting{0, {std::nan(""), 0}, 0}));
+  }
+}
+
 TEST_CASE("simulated interaction: an effect of a user's own is a force, a name and a range") {
   auto effects = pour_catalogue();
   Effect stirrer;

@@ -36,6 +36,13 @@ enum class EffectKind {
   Nuisance  ///< a measurement's too, but only ever taken account of, not named: what it explains nothing else has to
 };
 
+/// What a camera sees first of an effect that acts at a place, there.
+enum class SeenFirst {
+  Nothing,  ///< it is seen elsewhere, or everywhere
+  Liquid,   ///< where none is expected
+  Either    ///< liquid where none is expected, or none where there should be some
+};
+
 /// When an effect acts, on the recording's clock [s]. Ends that are not finite are none.
 struct TimeWindow {
   double from = -std::numeric_limits<double>::infinity();
@@ -50,10 +57,11 @@ struct Effect {
   std::string meaning{};  ///< what it is, for people: "air slows the liquid in proportion to its speed"
   std::vector<EffectComponent> components{1};  ///< one to three
   EffectKind kind = EffectKind::Physics;
-  std::string where{};                     ///< the place in words, "floor of the cup"; empty if it has none
-  std::optional<Vector3<double>> place{};  ///< where it acts [m], in the model's own frame for it
-  double place_tolerance = 0;              ///< how far from there it may be as well [m]; 0: no other place is tried
-  std::optional<TimeWindow> window{};      ///< when it acts, if it does not all the time
+  std::string where{};                        ///< the place in words, "floor of the cup"; empty if it has none
+  std::optional<Vector3<double>> place{};     ///< where it acts [m], in the model's own frame for it
+  double place_tolerance = 0;                 ///< how far from there it may be as well [m]; 0: no other place is tried
+  SeenFirst seen_first = SeenFirst::Nothing;  ///< where recordings begin to disagree with a model it may be, if so
+  std::optional<TimeWindow> window{};         ///< when it acts, if it does not all the time
   double window_tolerance = 0;  ///< how much earlier or later finite ends of it may be [s]; 0: no others are tried
   std::string code{};  ///< C++ that adds it to a simulator: @ stands for the strength, one after another of its
                        ///< components, # for the place, and ~ for the window's ends, one after another; empty where

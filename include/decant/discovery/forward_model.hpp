@@ -35,6 +35,13 @@ struct ModelRun {
   bool tolerated = false;                ///< the seed draws all that is tolerated, too: see EffectComponent
 };
 
+/// Something that a camera saw.
+struct Sighting {
+  std::size_t camera = 0;
+  Eigen::Vector2d pixel{0, 0};  ///< (u, v) [px]
+  double time = 0;              ///< on the recording's clock [s]
+};
+
 /// Predicts one interaction, with the bodies moving as they were recorded to.
 /// effects(): what it can be given. predict(run): what each camera would have seen, in the recording's frames; empty
 /// where the model failed. A pure function, called from several threads at once; it may take seconds. Throws
@@ -43,6 +50,13 @@ template <class M>
 concept ForwardModel = requires(const M& model, const ModelRun& run) {
   { model.effects() } -> std::convertible_to<const std::vector<Effect>&>;
   { model.predict(run) } -> std::convertible_to<std::vector<SilhouetteSeries>>;
+};
+
+/// One that can tell where an effect would act of which something was seen: place_of(effect, sighting), in the model's
+/// own frame for it [m]; nothing where it cannot be.
+template <class M>
+concept LocatingModel = ForwardModel<M> && requires(const M& model, std::size_t effect, const Sighting& sighting) {
+  { model.place_of(effect, sighting) } -> std::same_as<std::optional<Vector3<double>>>;
 };
 
 }  // namespace decant::inline DECANT_TARGET

@@ -261,20 +261,23 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
                            "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
   effect.place_tolerance = 0.02;
+  effect.seen_first = SeenFirst::Liquid;
   effect.where = std::move(where);
-  return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
-                                   [body, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-                                     OutletSettings outlet;
-                                     outlet.body = body;
-                                     outlet.position = *as.place;
-                                     outlet.exit = *as.place + below;
-                                     outlet.flow = detail::steady(as.strength[0]);
-                                     changes.of_model.push_back([outlet](Model& model) {
-                                       OutletSettings own = outlet;
-                                       own.radius = 3 * model.spacing();
-                                       model.add_outlet(own);
-                                     });
-                                   });
+  auto result = detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                          [body, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                            OutletSettings outlet;
+                                            outlet.body = body;
+                                            outlet.position = *as.place;
+                                            outlet.exit = *as.place + below;
+                                            outlet.flow = detail::steady(as.strength[0]);
+                                            changes.of_model.push_back([outlet](Model& model) {
+                                              OutletSettings own = outlet;
+                                              own.radius = 3 * model.spacing();
+                                              model.add_outlet(own);
+                                            });
+                                          });
+  result.of_body = body;
+  return result;
 }
 
 /// Liquid that a container loses everywhere: it evaporates, or the container soaks it up. @param radius around the
@@ -307,6 +310,7 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
       detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
                            "simulator.add_inlet({{#}, down, radius, {{~, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
   effect.place = place;
+  effect.seen_first = SeenFirst::Liquid;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
   effect.window = window;
@@ -333,9 +337,10 @@ InteractionEffect<Model> obstacle_effect(BodyId body, const Vector3<double>& pla
                                        {"", 0, 0, 0.03},
                                        "simulator.add_body(\"obstacle\", cube at {#} of edge @, motion_of_container);");
   effect.place = place;
+  effect.seen_first = SeenFirst::Either;
   effect.where = std::move(where);
   effect.place_tolerance = 0.02;
-  return detail::run_effect<Model>(
+  auto result = detail::run_effect<Model>(
       std::move(effect), EffectKind::Physics, [body](const AppliedEffect& as, InteractionChanges<Model>& changes) {
         const Vector3<double> half = Vector3<double>::Constant(0.5 * as.strength[0]), middle = *as.place;
         changes.of_model.push_back([=](Model& model) {
@@ -344,6 +349,8 @@ InteractionEffect<Model> obstacle_effect(BodyId body, const Vector3<double>& pla
           }
         });
       });
+  result.of_body = body;
+  return result;
 }
 
 /// A container's narrow neck.

@@ -76,7 +76,8 @@ struct MissingEffectSettings {
 
 /// An effect with what is known of it after refinement.
 struct RefinedEffect {
-  std::size_t effect = 0;
+  std::size_t effect = 0;  ///< its number among the model's
+  std::size_t judged = 0;  ///< and in MissingEffect::judged
   Eigen::VectorXd strength{};
   Eigen::VectorXd deviation{};             ///< standard deviation, by component
   std::optional<Vector3<double>> place{};  ///< [m], where it was looked for
@@ -119,6 +120,8 @@ struct MissingEffect {
   std::vector<RefinedEffect> refined{};  ///< all that were looked at closely in the first round, the best first
   std::vector<std::size_t> one_of{};     ///< of OneOf: numbers of effects that are not told apart
   Judgement judgement{};                 ///< of the first round, before refinement
+  std::vector<Effect> judged{};          ///< what its numbers are of: the models' effects, and then those of them that
+                                         ///< were also tried where recordings begin to disagree
   std::vector<std::vector<Disagreement>> where{};  ///< by recording, before anything was added
   std::vector<SmallestSeen> smallest_seen{};       ///< of each effect that is judged
   GapChange learn{}, held_out{};
@@ -168,17 +171,21 @@ class MissingEffectSearch {
     discrepancy_ = discrepancy();
     bool explained = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
-      const Knowledge known = know(learn_, effects(), applied(result.found));
-      const Judgement judgement = judge_effects(effects(), known.evidence, known.chance, settings_.judgement);
+      Knowledge known = know(learn_, effects(), applied(result.found));
+      Judgement judgement = judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
       if (round == 0) {
         result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
         for (const RecordedEvidence& each : known.recorded) {
           result.where.push_back(find_disagreements(each.features(), beyond_chance(each), settings_.threshold));
         }
-        result.judgement = judgement;
         const std::vector<double>& shares = settings_.dictionary.shares;
         result.smallest_seen =
             smallest_seen(effects(), known.recorded, known.chance, *std::min_element(shares.begin(), shares.end()));
+        if (judgement.has_gap() && locate(known, result.where)) {
+          judgement = judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
+        }
+        result.judgement = judgement;
+        result.judged = known.effects;
       }
       if (judgement.verdict == Verdict::Nothing) {
         break;
@@ -225,6 +232,8 @@ class MissingEffectSearch {
  private:
   /// What recordings say of a model.
   struct Knowledge {
+    std::vector<Effect> effects{};      ///< of which there are runs
+    std::vector<std::size_t> number{};  ///< of each among the model's
     std::vector<EffectDictionary> dictionary{};
     std::vector<RecordedEvidence> recorded{};
     std::vector<EffectEvidence> evidence{};
@@ -309,10 +318,22 @@ class MissingEffectSearch {
     }
     const std::vector<Series> seen = predictions(runs);
     Knowledge known;
+    known.effects = effects;
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      known.number.push_back(k);
+    }
     for (std::size_t k = 0; k < of.size(); ++k) {
       const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
       known.dictionary.push_back({effects, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
     }
+    compare(of, known);
+    return known;
+  }
+
+  /// Recordings with dictionaries.
+  void compare(const std::vector<Interaction<Model>>& of, Knowledge& known) const {
+    known.recorded.clear();
+    known.evidence.clear();
     std::vector<std::vector<EffectEvidence>> draws;
     for (std::size_t k = 0; k < of.size(); ++k) {  // dictionaries are not moved from here on
       known.recorded.emplace_back(of[k].recording, known.dictionary[k], settings_.evidence);
@@ -326,7 +347,102 @@ class MissingEffectSearch {
     known.chance.largest_distance = std::max(
         known.chance.largest_distance, settings_.reference_factor * discrepancy_.distance * known.chance.distance);
     known.chance.fall = std::max(known.chance.fall, settings_.reference_factor * discrepancy_.fall);
-    return known;
+  }
+
+  /// Effects that are seen first where they act are tried where recordings begin to disagree, too: a jet that does not
+  /// overlap with the one that there is says nothing of it. @param where by recording. @return whether there are any.
+  bool locate(Knowledge& known, const std::vector<std::vector<Disagreement>>& where) {
+    if constexpr (LocatingModel<Model>) {
+      const std::vector<AppliedEffect> places = located_effects(where);
+      std::vector<PlannedRun> plan;
+      std::uint32_t seed = 4001;
+      for (const AppliedEffect& at : places) {
+        Effect& effect = known.effects.emplace_back(effects()[at.effect]);
+        known.number.push_back(at.effect);
+        effect.place = at.place;
+        effect.where = "where recordings begin to disagree";
+        if (at.window) {
+          effect.window = at.window;
+          effect.window_tolerance = std::min(effect.window_tolerance, latest_sight);
+        }
+        for (const double share : settings_.dictionary.shares) {
+          PlannedRun planned{RunRole::Effect, known.effects.size() - 1, {{at}, seed++, false}};
+          planned.run.effects.back().strength = effect.base();
+          const EffectComponent& component = effect.components.front();
+          planned.run.effects.back().strength[0] += share * (component.high - component.base);
+          plan.push_back(std::move(planned));
+        }
+      }
+      std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
+      for (const Interaction<Model>& each : learn_) {
+        for (const PlannedRun& planned : plan) {
+          runs.emplace_back(&each, planned.run);
+        }
+      }
+      const std::vector<Series> seen = predictions(runs);
+      for (std::size_t k = 0; k < learn_.size(); ++k) {
+        EffectDictionary& dictionary = known.dictionary[k];
+        dictionary.effects = known.effects;
+        dictionary.runs.insert(dictionary.runs.end(), plan.begin(), plan.end());
+        const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
+        dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
+      }
+      if (!plan.empty()) {
+        compare(learn_, known);
+      }
+      return !plan.empty();
+    }
+    return false;
+  }
+
+  /// Of each name and SeenFirst the one whose usual place is nearest to where recordings say it is; none that would be
+  /// far from all that are usual. @param where by recording; the first one that disagrees is asked.
+  std::vector<AppliedEffect> located_effects(const std::vector<std::vector<Disagreement>>& where) const requires
+      LocatingModel<Model> {
+    const auto earliest = [](const std::vector<Disagreement>& of, bool only_unexpected) {
+      const Disagreement* first = nullptr;
+      for (const Disagreement& each : of) {
+        const bool counts = (each.unexpected || !only_unexpected) && each.squares > 1;  // one square is easily chance
+        if (counts && (first == nullptr || each.begin < first->begin)) {
+          first = &each;
+        }
+      }
+      return first;
+    };
+    std::map<std::string, std::pair<double, AppliedEffect>> nearest;  // by name, with the distance over the tolerance
+    for (std::size_t k = 0; k < effects().size(); ++k) {
+      const Effect& effect = effects()[k];
+      if (effect.seen_first == SeenFirst::Nothing || effect.place_tolerance == 0) {
+        continue;
+      }
+      for (std::size_t recording = 0; recording < where.size(); ++recording) {
+        const Disagreement* onset = earliest(where[recording], effect.seen_first == SeenFirst::Liquid);
+        if (onset == nullptr) {
+          continue;
+        }
+        const Sighting sighting{onset->camera, {onset->onset_u, onset->onset_v}, onset->begin};
+        const auto place = learn_[recording].model->place_of(k, sighting);
+        if (place) {
+          const double off = (*place - *effect.place).norm() / effect.place_tolerance;
+          const auto [slot, is_new] = nearest.try_emplace(effect.name, off, AppliedEffect{});
+          if (is_new || off < slot->second.first) {
+            slot->second = {off, {k, {}, place, {}}};
+            if (effect.window && std::isfinite(effect.window->from)) {  // it takes a moment to be seen
+              slot->second.second.window = effect.window;
+              slot->second.second.window->from = std::min(onset->begin - 0.3 * latest_sight, effect.window->until);
+            }
+          }
+        }
+        break;
+      }
+    }
+    std::vector<AppliedEffect> located;
+    for (const auto& [name, found] : nearest) {
+      if (found.first < farthest_place) {
+        located.push_back(found.second);
+      }
+    }
+    return located;
   }
 
   /// How far references are from the model, over how far its draws are, and how much of it effects seem to explain,
@@ -367,19 +483,21 @@ class MissingEffectSearch {
     std::vector<Candidate> candidates;
     std::map<std::string, int> instances;
     for (const EffectStanding& standing : judgement.standings) {
-      const Effect& effect = effects()[standing.effect];
-      const bool is_found = std::any_of(found.begin(), found.end(),
-                                        [&](const RefinedEffect& other) { return other.effect == standing.effect; });
+      const Effect& effect = known.effects[standing.effect];
+      const std::size_t number = known.number[standing.effect];
+      const bool is_found =
+          std::any_of(found.begin(), found.end(), [&](const RefinedEffect& other) { return other.effect == number; });
       // of one family the best one, and of an effect in several places two of them
       const int most = effect.place ? 2 : 1;
       if (candidates.size() < static_cast<std::size_t>(settings_.refined) && !is_found && standing.improvement > 0 &&
           instances[effect.answer()] < most) {
         ++instances[effect.answer()];
-        EffectPoint& point = candidates.emplace_back().point;
+        candidates.emplace_back().judged = standing.effect;
+        EffectPoint& point = candidates.back().point;
         for (const RefinedEffect& each : found) {
           point.add(effects()[each.effect], each.effect, each.applied());
         }
-        point.add(effect, standing.effect, {standing.effect, standing.strength, {}});
+        point.add(effect, number, {number, standing.strength, {}});
       }
     }
     for (int round = 0; round < settings_.refinement_rounds && !candidates.empty(); ++round) {
@@ -408,7 +526,8 @@ class MissingEffectSearch {
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);
         const auto [begin, count] = points[k].strength_of(part);
-        one.effects.push_back({applied.effect, applied.strength, deviation.segment(begin, count), applied.place,
+        const std::size_t judged = part < found.size() ? found[part].judged : candidates[k].judged;
+        one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
                                applied.window, one.distance, one.share});
       }
       refined.push_back(std::move(one));
@@ -441,6 +560,7 @@ class MissingEffectSearch {
 
   /// An effect on its way to where it explains most.
   struct Candidate {
+    std::size_t judged = 0;  ///< its number in the Judgement
     EffectPoint point{};
     Views views{};         ///< of the last step
     double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
@@ -678,6 +798,9 @@ class MissingEffectSearch {
       result.confirmation = shrinks && best ? Confirmation::Confirmed : Confirmation::Refuted;
     }
   }
+
+  static constexpr double latest_sight = 0.3;  ///< how long it may take until something is seen of an effect [s]
+  static constexpr double farthest_place = 3;  ///< from where it usually is, in its place_tolerance
 
   std::vector<Interaction<Model>> learn_, held_out_, references_;
   RunJobs run_jobs_;

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <span>
 #include <string>
@@ -74,6 +75,7 @@ struct InteractionChanges {
 /// apply(as, changes): with place and window as they are asked for, or the effect's own.
 template <class Model>
 struct InteractionEffect : Effect {
+  std::optional<std::size_t> of_body{};  ///< in whose frame its place is; the world's otherwise
   std::function<void(const AppliedEffect& as, InteractionChanges<Model>& changes)> apply{};
 };
 
@@ -150,6 +152,9 @@ class SimulatedInteraction {
     for (InteractionEffect<Model>& effect : effects) {
       validate(effect);
       expects(static_cast<bool>(effect.apply), "Effect '" + effect.name + "': apply", "a function", "none");
+      expects(!effect.of_body || *effect.of_body < scene_.motion.size(), "Effect '" + effect.name + "': of_body",
+              "one of those that there are motions of", effect.of_body.value_or(0));
+      of_body_.push_back(effect.of_body);
       apply_.push_back(std::move(effect.apply));
       effects_.push_back(std::move(effect));
     }
@@ -203,6 +208,34 @@ class SimulatedInteraction {
       }
     }
     return result;
+  }
+
+  /// Where an effect acts if that is what was seen: on the pixel's ray, in the upright plane through the effect's usual
+  /// place that faces the camera. One camera does not say how far off it is.
+  std::optional<Vector3<double>> place_of(std::size_t effect, const Sighting& seen) const {
+    const Effect& of = effects_.at(effect);
+    if (!of.place || seen.camera >= scene_.cameras.size() || !seen.pixel.allFinite() || !std::isfinite(seen.time)) {
+      return std::nullopt;
+    }
+    const InteractionCamera<CameraType>& camera = scene_.cameras[seen.camera];
+    const auto next = std::lower_bound(scene_.times.begin(), scene_.times.end(), seen.time - 1e-9);
+    const auto frame =
+        std::min<std::size_t>(static_cast<std::size_t>(next - scene_.times.begin()), scene_.times.size() - 1);
+    const Pose world_from_camera = camera.camera_from_world[frame].inverse();
+    const Pose own = of_body_[effect] ? scene_.motion[*of_body_[effect]].at(seen.time) : Pose{};
+    const Vector3<double> begin = world_from_camera * camera.camera.unproject(seen.pixel, 0);
+    const Vector3<double> along = world_from_camera * camera.camera.unproject(seen.pixel, 1) - begin;
+    const Vector3<double> up = -settled({}, 1).settings().gravity.normalized();
+    const Vector3<double> sight = world_from_camera.rotation * Vector3<double>::UnitZ();
+    Vector3<double> normal = sight - sight.dot(up) * up;
+    if (normal.norm() < 0.3) {  // from above: a level plane
+      normal = sight;
+    }
+    const double reach = normal.dot(own * *of.place - begin) / normal.dot(along);
+    if (!std::isfinite(reach) || reach <= 0) {
+      return std::nullopt;
+    }
+    return own.inverse() * (begin + reach * along);
   }
 
   /// The model of a run as it starts: its clock stands at what is the first frame's time, its bodies are in motion.
@@ -396,6 +429,7 @@ class SimulatedInteraction {
   SimulatedInteractionSettings settings_;
   std::vector<Effect> effects_{};
   std::vector<decltype(InteractionEffect<Model>::apply)> apply_{};
+  std::vector<std::optional<std::size_t>> of_body_{};
   std::shared_ptr<Starts> starts_;  ///< copies share what they have settled
 };
 
