@@ -199,7 +199,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                                   {"where", effects.at(each.effect).where},
                                   {"strength", detail::components_json(each.strength)},
                                   {"distance", number_json(each.distance)},
-                                  {"share", number_json(each.share)},
+                                  {"share", result.judgement.has_gap() ? number_json(each.share) : nlohmann::json()},
                                   {"vote", number_json(each.vote)}});
   }
   for (const decant::SmallestSeen& each : result.smallest_seen) {

@@ -61,6 +61,7 @@ RunJobs run_jobs_on(ExecutorType& executor, Done done = tell_nobody) {
 
 struct MissingEffectSettings {
   DictionarySettings dictionary{};
+  DictionarySettings next_dictionary{4, 16, {0.5}};  ///< after an effect was added, and something is still missing
   RecordedEvidenceSettings evidence{};
   JudgementSettings judgement{};
   int refined = 3;                     ///< so many of the best are looked at more closely, >= 1
@@ -69,6 +70,8 @@ struct MissingEffectSettings {
   int refinement_seeds = 2;            ///< runs at each point, >= 1
   double least_share = 0.8;            ///< of what is reducible effects have to explain in the end, 0 .. 1
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
+  double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
+                                       ///< what is left may be how the model has them
   int most_effects = 3;                ///< that are added one after another, >= 1
   double reference_factor = 1.1;       ///< on what references do, >= 1: beyond it something is missing
   double threshold = 4;                ///< of find_disagreements
@@ -171,7 +174,8 @@ class MissingEffectSearch {
     discrepancy_ = discrepancy();
     bool explained = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
-      Knowledge known = know(learn_, effects(), applied(result.found));
+      Knowledge known =
+          know(learn_, effects(), round == 0 ? settings_.dictionary : settings_.next_dictionary, applied(result.found));
       Judgement judgement = judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
       if (round == 0) {
         result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
@@ -211,7 +215,8 @@ class MissingEffectSearch {
       if (round == 0 && explained) {
         result.one_of = alike(result.refined, known.chance);
       }
-      if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1) {
+      if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
+          refined.front().share >= settings_.enough_share) {
         break;
       }
     }
@@ -308,8 +313,8 @@ class MissingEffectSearch {
 
   /// @param effects of which there are runs; none where only the gap is asked about.
   Knowledge know(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
-                 const std::vector<AppliedEffect>& added) {
-    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings_.dictionary, added);
+                 const DictionarySettings& settings, const std::vector<AppliedEffect>& added = {}) {
+    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings, added);
     std::vector<std::pair<const Interaction<Model>*, ModelRun>> runs;
     for (const Interaction<Model>& each : of) {
       for (const PlannedRun& planned : plan) {
@@ -453,7 +458,7 @@ class MissingEffectSearch {
   Discrepancy discrepancy() {
     Discrepancy most;
     for (const Interaction<Model>& each : references_) {
-      const Knowledge known = know({each}, effects(), {});
+      const Knowledge known = know({each}, effects(), settings_.dictionary);
       const EffectEvidence& evidence = known.evidence.front();
       most.distance = std::max(most.distance, evidence.distance / std::max(known.chance.distance, 1e-12));
       for (const auto& profile : evidence.profile) {
@@ -762,7 +767,7 @@ class MissingEffectSearch {
 
   /// Predicts recordings that were not used, with what was found and with its rivals, strengths as they were found.
   void check(MissingEffect& result) {
-    const Knowledge known = know(held_out_, {}, {});
+    const Knowledge known = know(held_out_, {}, settings_.dictionary);
     GapChange& gap = result.held_out;
     gap.before = 0;
     for (const EffectEvidence& each : known.evidence) {
