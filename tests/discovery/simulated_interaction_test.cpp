@@ -411,6 +411,9 @@ TEST_CASE("simulated interaction: what is seen somewhere has its place there, as
     CHECK((*pour.place_of(inflow, seen(there, 2)) - there).norm() < 1e-9);
     // of what is nearer to the camera it is told where it would be if it were as far off as usual
     CHECK((*pour.place_of(inflow, seen(there + 0.3 * (eye - there), 2)) - there).norm() < 1e-9);
+    // liquid that falls comes from above
+    const Vector3<double> fallen = *pour.effects()[inflow].place + Vector3<double>(-0.04, 0, -0.03);
+    CHECK((*pour.place_of(inflow, seen(fallen, 2)) - (fallen + Vector3<double>(0, 0, 0.03))).norm() < 1e-9);
     // a leak's place is in its container, which turns
     const std::size_t leak = number("leak");
     for (const std::size_t frame : {std::size_t{0}, std::size_t{3}}) {

@@ -40,6 +40,7 @@ enum class EffectKind {
 enum class SeenFirst {
   Nothing,  ///< it is seen elsewhere, or everywhere
   Liquid,   ///< where none is expected
+  Falling,  ///< the same below its place: liquid that comes from there
   Either    ///< liquid where none is expected, or none where there should be some
 };
 

@@ -310,7 +310,7 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
       detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
                            "simulator.add_inlet({{#}, down, radius, {{~, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
   effect.place = place;
-  effect.seen_first = SeenFirst::Liquid;
+  effect.seen_first = SeenFirst::Falling;
   effect.where = std::move(where);
   effect.place_tolerance = 0.04;
   effect.window = window;

@@ -421,7 +421,7 @@ class MissingEffectSearch {
         continue;
       }
       for (std::size_t recording = 0; recording < where.size(); ++recording) {
-        const Disagreement* onset = earliest(where[recording], effect.seen_first == SeenFirst::Liquid);
+        const Disagreement* onset = earliest(where[recording], effect.seen_first != SeenFirst::Either);
         if (onset == nullptr) {
           continue;
         }

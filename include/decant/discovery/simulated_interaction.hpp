@@ -211,7 +211,8 @@ class SimulatedInteraction {
   }
 
   /// Where an effect acts if that is what was seen: on the pixel's ray, in the upright plane through the effect's usual
-  /// place that faces the camera. One camera does not say how far off it is.
+  /// place that faces the camera, and no lower than that if it is liquid that falls. One camera does not say how far
+  /// off it is.
   std::optional<Vector3<double>> place_of(std::size_t effect, const Sighting& seen) const {
     const Effect& of = effects_.at(effect);
     if (!of.place || seen.camera >= scene_.cameras.size() || !seen.pixel.allFinite() || !std::isfinite(seen.time)) {
@@ -235,7 +236,11 @@ class SimulatedInteraction {
     if (!std::isfinite(reach) || reach <= 0) {
       return std::nullopt;
     }
-    return own.inverse() * (begin + reach * along);
+    Vector3<double> place = begin + reach * along;
+    if (of.seen_first == SeenFirst::Falling) {
+      place += std::max(0.0, up.dot(own * *of.place - place)) * up;
+    }
+    return own.inverse() * place;
   }
 
   /// The model of a run as it starts: its clock stands at what is the first frame's time, its bodies are in motion.
