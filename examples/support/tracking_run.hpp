@@ -43,7 +43,8 @@ struct TrackingOptions {
   bool keep_overlays = false;                     ///< for reports; takes some MB of memory per hundred frames
   double initial_amount_factor = 1;               ///< the model starts with so much of what the recording says, >= 0
   decant::Slip source_slip = decant::Slip::Free;  ///< how liquid goes along what it is poured from
-  decant::SimulatorSettings solver = decant::for_tracking({});  ///< its spacing, liquid and gravity are not used
+  /// Its spacing, liquid, gravity and threads are not used.
+  decant::SimulatorSettings solver = decant::for_tracking({});
   /// What the tracker gets to see of a frame and camera instead of the recording's masks, which forecasts are scored
   /// against in any case.
   std::function<std::optional<decant::Mask>(const decant::Recording&, std::size_t frame, std::size_t camera)> masks{};

@@ -72,6 +72,7 @@
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/effect_evidence.hpp>
 #include <decant/discovery/effect_judgement.hpp>
+#include <decant/discovery/effect_location.hpp>
 #include <decant/discovery/effect_refinement.hpp>
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/liquid_effects.hpp>

@@ -236,4 +236,10 @@ TEST_CASE("missing effect: what is asked is checked") {
   settings = {};
   settings.dictionary.draws = 3;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings).find(), decant_test::contains("draws"));
+  settings = {};
+  settings.next_dictionary.shares = {2};  // told before anything is run
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("share"));
+  settings = {};
+  settings.enough_share = -1;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("enough_share"));
 }

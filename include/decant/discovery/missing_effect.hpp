@@ -28,6 +28,7 @@
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/effect_evidence.hpp>
 #include <decant/discovery/effect_judgement.hpp>
+#include <decant/discovery/effect_location.hpp>
 #include <decant/discovery/effect_refinement.hpp>
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/silhouette_series.hpp>
@@ -164,6 +165,9 @@ class MissingEffectSearch {
     expects(settings_.refined >= 1 && settings_.refinement_rounds >= 1 && settings_.refinement_seeds >= 1,
             "MissingEffectSettings: refined, refinement_rounds, refinement_seeds", ">= 1", settings_.refined);
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
+    expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
+            settings_.enough_share);
+    plan_dictionary(effects(), settings_.next_dictionary);  // which is not needed before the search has run for long
   }
 
   const std::vector<Effect>& effects() const { return learn_.front().model->effects(); }
@@ -358,7 +362,14 @@ class MissingEffectSearch {
   /// overlap with the one that there is says nothing of it. @param where by recording. @return whether there are any.
   bool locate(Knowledge& known, const std::vector<std::vector<Disagreement>>& where) {
     if constexpr (LocatingModel<Model>) {
-      const std::vector<AppliedEffect> places = located_effects(where);
+      std::vector<const Model*> models;
+      for (const Interaction<Model>& each : learn_) {
+        models.push_back(each.model);
+      }
+      const std::vector<AppliedEffect> places = located_effects(models, where);
+      if (places.empty()) {
+        return false;
+      }
       std::vector<PlannedRun> plan;
       std::uint32_t seed = 4001;
       for (const AppliedEffect& at : places) {
@@ -368,7 +379,7 @@ class MissingEffectSearch {
         effect.where = "where recordings begin to disagree";
         if (at.window) {
           effect.window = at.window;
-          effect.window_tolerance = std::min(effect.window_tolerance, latest_sight);
+          effect.window_tolerance = std::min(effect.window_tolerance, detail::latest_sight);
         }
         for (const double share : settings_.dictionary.shares) {
           PlannedRun planned{RunRole::Effect, known.effects.size() - 1, {{at}, seed++, false}};
@@ -392,62 +403,10 @@ class MissingEffectSearch {
         const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
         dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
       }
-      if (!plan.empty()) {
-        compare(learn_, known);
-      }
-      return !plan.empty();
+      compare(learn_, known);
+      return true;
     }
     return false;
-  }
-
-  /// Of each name and SeenFirst the one whose usual place is nearest to where recordings say it is; none that would be
-  /// far from all that are usual. @param where by recording; the first one that disagrees is asked.
-  std::vector<AppliedEffect> located_effects(const std::vector<std::vector<Disagreement>>& where) const requires
-      LocatingModel<Model> {
-    const auto earliest = [](const std::vector<Disagreement>& of, bool only_unexpected) {
-      const Disagreement* first = nullptr;
-      for (const Disagreement& each : of) {
-        const bool counts = (each.unexpected || !only_unexpected) && each.squares > 1;  // one square is easily chance
-        if (counts && (first == nullptr || each.begin < first->begin)) {
-          first = &each;
-        }
-      }
-      return first;
-    };
-    std::map<std::string, std::pair<double, AppliedEffect>> nearest;  // by name, with the distance over the tolerance
-    for (std::size_t k = 0; k < effects().size(); ++k) {
-      const Effect& effect = effects()[k];
-      if (effect.seen_first == SeenFirst::Nothing || effect.place_tolerance == 0) {
-        continue;
-      }
-      for (std::size_t recording = 0; recording < where.size(); ++recording) {
-        const Disagreement* onset = earliest(where[recording], effect.seen_first != SeenFirst::Either);
-        if (onset == nullptr) {
-          continue;
-        }
-        const Sighting sighting{onset->camera, {onset->onset_u, onset->onset_v}, onset->begin};
-        const auto place = learn_[recording].model->place_of(k, sighting);
-        if (place) {
-          const double off = (*place - *effect.place).norm() / effect.place_tolerance;
-          const auto [slot, is_new] = nearest.try_emplace(effect.name, off, AppliedEffect{});
-          if (is_new || off < slot->second.first) {
-            slot->second = {off, {k, {}, place, {}}};
-            if (effect.window && std::isfinite(effect.window->from)) {  // it takes a moment to be seen
-              slot->second.second.window = effect.window;
-              slot->second.second.window->from = std::min(onset->begin - 0.3 * latest_sight, effect.window->until);
-            }
-          }
-        }
-        break;
-      }
-    }
-    std::vector<AppliedEffect> located;
-    for (const auto& [name, found] : nearest) {
-      if (found.first < farthest_place) {
-        located.push_back(found.second);
-      }
-    }
-    return located;
   }
 
   /// How far references are from the model, over how far its draws are, and how much of it effects seem to explain,
@@ -594,11 +553,11 @@ class MissingEffectSearch {
       }
     };
     for (const Candidate& each : candidates) {
+      if (each.settled) {
+        continue;
+      }
       const EffectPoint& point = each.point;
       for (const Interaction<Model>& of : learn_) {
-        if (each.settled) {
-          break;
-        }
         ask(of, point, middle_seeds());
         for (Eigen::Index k = 0; k < point.size(); ++k) {
           ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
@@ -803,9 +762,6 @@ class MissingEffectSearch {
       result.confirmation = shrinks && best ? Confirmation::Confirmed : Confirmation::Refuted;
     }
   }
-
-  static constexpr double latest_sight = 0.3;  ///< how long it may take until something is seen of an effect [s]
-  static constexpr double farthest_place = 3;  ///< from where it usually is, in its place_tolerance
 
   std::vector<Interaction<Model>> learn_, held_out_, references_;
   RunJobs run_jobs_;
