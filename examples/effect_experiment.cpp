@@ -66,7 +66,6 @@ int main(int count, char** values) {
     // one scenario after the other: what is stopped has few dictionaries of runs begun
     std::stable_sort(cases.begin(), cases.end(), [](const auto& a, const auto& b) { return a.scenario < b.scenario; });
     example::EffectExperiment experiment(options);
-    experiment.record(cases);
     experiment.run(cases);
     return example::tell_experiment(
         {"What the model lacks", 2 * cases.size(), 3, reality_mm,

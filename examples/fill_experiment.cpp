@@ -63,8 +63,6 @@ int main(int count, char** values) {
     auto amounts = set == "levels" ? std::vector<example::Pour>() : example::amount_pours();
     keep(only, levels, amounts);
     example::FillExperiment experiment(options);
-    experiment.record(levels);
-    experiment.record(amounts);
     experiment.run(levels, methods);
     experiment.run(amounts, {});
     return example::tell_experiment({"How much was in it", levels.size() + amounts.size(), options.duration, reality_mm,

@@ -79,7 +79,6 @@ int main(int count, char** values) {
     }
     example::JunctionExperiment experiment(options);
     for (const auto* cases : {&configurations, &openings, &others}) {
-      experiment.record(*cases);
       experiment.run(*cases, cases == &configurations ? methods : std::vector<std::string>{example::default_method});
     }
     return example::tell_experiment(

@@ -171,7 +171,6 @@ int main(int count, char** values) {
     const Plan plan = plan_of(set, methods, only, conditions);
     const std::vector<example::TrackingJob> jobs = jobs_of(set, plan);
     example::TrackingExperiment experiment(options);
-    experiment.record(plan.pours);
     experiment.run(jobs);
     const std::vector<example::ExperimentSection> sections = sections_of(set, plan, experiment);
     example::print_sections(sections);

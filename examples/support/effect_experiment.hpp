@@ -58,26 +58,14 @@ class EffectExperiment {
     decant::detail::make_folder(options_.folder / "runs");
   }
 
-  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<EffectCase>& cases) {
-    std::vector<ExperimentRecording> recordings;
-    for (const EffectCase& each : cases) {
-      for (const std::size_t which : {0, 1}) {
-        const EffectRecordingSettings settings = options_.recording;
-        recordings.push_back({recording_name(each, which), each.seed, settings.spacing, frames(each, which),
-                              [each, which, settings](const auto& folder, const auto& progress) {
-                                record_effect_pour(each, which, folder, settings, progress);
-                              }});
-      }
-    }
-    folder_.record(recordings);
-  }
-
-  /// Judges what is not judged yet.
+  /// Judges what is not judged yet; see ExperimentFolder::run.
   void run(const std::vector<EffectCase>& cases) {
     std::vector<ExperimentJob> jobs;
     for (const EffectCase& each : cases) {
-      jobs.push_back({key(each), settings_json(each), [this, each](const auto&) { return judge(each); }});
+      jobs.push_back(
+          {key(each), settings_json(each), {recording_of(each, 0), recording_of(each, 1)}, [this, each](const auto&) {
+             return judge(each);
+           }});
     }
     folder_.run("finding effects", jobs, true);  // the runs for one are made side by side
   }
@@ -95,6 +83,14 @@ class EffectExperiment {
     const double seconds =
         std::min(effect_scenarios().at(of.scenario).pours.at(which).duration, options_.recording.longest);
     return static_cast<std::size_t>(std::max(1L, std::lround(seconds * EffectRecordingSettings::frames_per_second)));
+  }
+
+  ExperimentRecording recording_of(const EffectCase& of, std::size_t which) const {
+    const EffectRecordingSettings settings = options_.recording;
+    return {recording_name(of, which), of.seed, settings.spacing, frames(of, which),
+            [of, which, settings](const auto& folder, const auto& progress) {
+              record_effect_pour(of, which, folder, settings, progress);
+            }};
   }
 
   // What a result depends on, beside the program.

@@ -45,6 +45,7 @@ struct ExperimentRecording {
 struct ExperimentJob {
   std::string key;  ///< of the result and its file
   nlohmann::json settings;
+  std::vector<ExperimentRecording> recordings;  ///< that it is computed from
   std::function<nlohmann::json(const std::function<void(double)>& progress)> compute;
 };
 
@@ -73,34 +74,9 @@ class ExperimentFolder {
     return nlohmann::json::parse(*text);
   }
 
-  /// Makes the recordings that are not there yet. Throws std::runtime_error, one line, where one cannot be written or
-  /// is there and was made otherwise.
-  void record(const std::vector<ExperimentRecording>& recordings) {
-    std::vector<const ExperimentRecording*> missing;
-    for (const ExperimentRecording& each : recordings) {
-      if (std::filesystem::exists(recording(each.name))) {
-        expect_made_as(each);
-      } else {
-        missing.push_back(&each);
-      }
-    }
-    TogetherProgress progress("recording", missing.size());
-    // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
-    const std::filesystem::path unfinished = folder_ / "unfinished";
-    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index number) {
-      const auto k = static_cast<std::size_t>(number);
-      const std::filesystem::path part = unfinished / missing[k]->name;
-      decant::detail::make_folder(unfinished);
-      std::filesystem::remove_all(part);
-      missing[k]->make(part, [&](double share) { progress.update(k, share); });
-      std::filesystem::rename(part, recording(missing[k]->name));
-    });
-    std::error_code not_empty;
-    std::filesystem::remove(unfinished, not_empty);
-    recorded_ += missing.size();
-  }
-
-  /// Computes what is not there yet; afterwards all have a result(). @param one_by_one for jobs that use all threads.
+  /// Computes what is not there yet, for which it makes the recordings that are not there yet; afterwards all have a
+  /// result(). Results alone are enough to tabulate them. @param one_by_one for jobs that use all threads. Throws
+  /// std::runtime_error, one line, where a recording cannot be written or is there and was made otherwise.
   void run(const std::string& label, const std::vector<ExperimentJob>& jobs, bool one_by_one = false) {
     std::vector<const ExperimentJob*> missing;
     for (const ExperimentJob& job : jobs) {
@@ -116,6 +92,7 @@ class ExperimentFolder {
         missing.push_back(&job);
       }
     }
+    record(recordings_for(missing));
     TogetherProgress progress(label, missing.size());
     std::mutex guard;
     const int threads = one_by_one ? 1 : threads_;
@@ -163,6 +140,45 @@ class ExperimentFolder {
     double done_ = 0;
     std::size_t finished_ = 0;
   };
+
+  // Jobs may share recordings.
+  static std::vector<ExperimentRecording> recordings_for(const std::vector<const ExperimentJob*>& jobs) {
+    std::vector<ExperimentRecording> recordings;
+    for (const ExperimentJob* job : jobs) {
+      for (const ExperimentRecording& each : job->recordings) {
+        if (std::none_of(recordings.begin(), recordings.end(),
+                         [&](const auto& other) { return other.name == each.name; })) {
+          recordings.push_back(each);
+        }
+      }
+    }
+    return recordings;
+  }
+
+  void record(const std::vector<ExperimentRecording>& recordings) {
+    std::vector<const ExperimentRecording*> missing;
+    for (const ExperimentRecording& each : recordings) {
+      if (std::filesystem::exists(recording(each.name))) {
+        expect_made_as(each);
+      } else {
+        missing.push_back(&each);
+      }
+    }
+    TogetherProgress progress("recording", missing.size());
+    // A folder that is not finished must not pass for a recording, and the recording bears its folder's name.
+    const std::filesystem::path unfinished = folder_ / "unfinished";
+    decant::parallel_jobs(static_cast<decant::Index>(missing.size()), {threads_}, [&](decant::Index number) {
+      const auto k = static_cast<std::size_t>(number);
+      const std::filesystem::path part = unfinished / missing[k]->name;
+      decant::detail::make_folder(unfinished);
+      std::filesystem::remove_all(part);
+      missing[k]->make(part, [&](double share) { progress.update(k, share); });
+      std::filesystem::rename(part, recording(missing[k]->name));
+    });
+    std::error_code not_empty;
+    std::filesystem::remove(unfinished, not_empty);
+    recorded_ += missing.size();
+  }
 
   std::filesystem::path results_folder() const { return folder_ / "results"; }
 

@@ -63,16 +63,14 @@ class FillExperiment {
   explicit FillExperiment(FillExperimentOptions options)
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
-  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<Pour>& pours) {
-    folder_.record(recordings_of(pours, options_.reality_spacing, options_.duration));
-  }
-
-  /// Estimates what is not there yet. @param methods that choose from levels, see FillOptions.
+  /// Estimates what is not there yet; see ExperimentFolder::run. @param methods that choose from levels, see
+  /// FillOptions.
   void run(const std::vector<Pour>& pours, const std::vector<std::string>& methods) {
     std::vector<ExperimentJob> jobs;
     for (const Pour& each : pours) {
-      jobs.push_back({key(each), settings_json(each, methods),
+      jobs.push_back({key(each),
+                      settings_json(each, methods),
+                      {recording_of(each, options_.reality_spacing, options_.duration)},
                       [this, each, methods](const auto& progress) { return compute(each, methods, progress); }});
     }
     folder_.run("estimating", jobs);

@@ -130,28 +130,14 @@ class JunctionExperiment {
   explicit JunctionExperiment(JunctionExperimentOptions options)
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
-  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<JunctionCase>& cases) {
-    std::vector<ExperimentRecording> recordings;
-    for (const JunctionCase& each : cases) {
-      JunctionTwin twin = each.twin;
-      twin.threads = 1;  // recordings are made side by side
-      twin.spacing = options_.reality_spacing;
-      twin.duration = options_.duration;
-      const auto frames = static_cast<std::size_t>(std::lround(twin.duration * twin.frames_per_second));
-      recordings.push_back(
-          {each.name, twin.seed, twin.spacing, frames,
-           [twin](const auto& folder, const auto& progress) { record_junction(twin, folder, progress); }});
-    }
-    folder_.record(recordings);
-  }
-
-  /// Finds what blocks them, where that is not there yet, by each method.
+  /// Finds what blocks them, where that is not there yet, by each method; see ExperimentFolder::run.
   void run(const std::vector<JunctionCase>& cases, const std::vector<std::string>& methods) {
     std::vector<ExperimentJob> jobs;
     for (const std::string& method : methods) {
       for (const JunctionCase& each : cases) {
-        jobs.push_back({key(each, method), settings_json(each, method),
+        jobs.push_back({key(each, method),
+                        settings_json(each, method),
+                        {recording_of(each)},
                         [this, each, method](const auto& progress) { return compute(each, method, progress); }});
       }
     }
@@ -167,6 +153,16 @@ class JunctionExperiment {
 
  private:
   static std::string key(const JunctionCase& of, const std::string& method) { return of.name + "." + method; }
+
+  ExperimentRecording recording_of(const JunctionCase& of) const {
+    JunctionTwin twin = of.twin;
+    twin.threads = 1;  // recordings are made side by side
+    twin.spacing = options_.reality_spacing;
+    twin.duration = options_.duration;
+    const auto frames = static_cast<std::size_t>(std::lround(twin.duration * twin.frames_per_second));
+    return {of.name, twin.seed, twin.spacing, frames,
+            [twin](const auto& folder, const auto& progress) { record_junction(twin, folder, progress); }};
+  }
 
   // What a result depends on, beside the program.
   nlohmann::json settings_json(const JunctionCase& of, const std::string& method) const {

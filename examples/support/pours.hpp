@@ -56,18 +56,14 @@ inline void keep_pours(std::vector<Pour>& pours, const std::vector<std::string>&
 }
 
 /// @param spacing of the reality's particles [m]. @param duration [s].
-inline std::vector<ExperimentRecording> recordings_of(const std::vector<Pour>& pours, double spacing, double duration) {
-  std::vector<ExperimentRecording> recordings;
-  for (const Pour& each : pours) {
-    PourTwin twin = each.twin;
-    twin.threads = 1;  // recordings are made side by side
-    twin.spacing = spacing;
-    twin.duration = duration;
-    const auto frames = static_cast<std::size_t>(std::lround(duration * twin.frames_per_second));
-    recordings.push_back({each.name, twin.seed, spacing, frames,
-                          [twin](const auto& folder, const auto& progress) { record_pour(twin, folder, progress); }});
-  }
-  return recordings;
+inline ExperimentRecording recording_of(const Pour& pour, double spacing, double duration) {
+  PourTwin twin = pour.twin;
+  twin.threads = 1;  // recordings are made side by side
+  twin.spacing = spacing;
+  twin.duration = duration;
+  const auto frames = static_cast<std::size_t>(std::lround(duration * twin.frames_per_second));
+  return {pour.name, twin.seed, spacing, frames,
+          [twin](const auto& folder, const auto& progress) { record_pour(twin, folder, progress); }};
 }
 
 }  // namespace example

@@ -292,17 +292,14 @@ class TrackingExperiment {
   explicit TrackingExperiment(ExperimentOptions options)
       : options_(std::move(options)), folder_(options_.folder, options_.threads, options_.again) {}
 
-  /// Makes the recordings that are not there yet; see ExperimentFolder::record.
-  void record(const std::vector<Pour>& pours) {
-    folder_.record(recordings_of(pours, options_.reality_spacing, options_.duration));
-  }
-
-  /// Runs what is not there yet; afterwards all have a result().
+  /// Runs what is not there yet; afterwards all have a result(). See ExperimentFolder::run.
   void run(const std::vector<TrackingJob>& jobs) {
     std::vector<ExperimentJob> all;
     for (const TrackingJob& job : jobs) {
-      all.push_back(
-          {job.key(), settings_json(job), [this, job](const auto& progress) { return compute(job, progress); }});
+      all.push_back({job.key(),
+                     settings_json(job),
+                     {recording_of(job.pour, options_.reality_spacing, options_.duration)},
+                     [this, job](const auto& progress) { return compute(job, progress); }});
     }
     folder_.run("tracking", all);
   }
