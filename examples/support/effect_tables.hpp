@@ -119,11 +119,11 @@ struct EffectScore {
 
  private:
   /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own. A wall acts on a layer of
-  /// particles the stronger the thinner that is, see EffectReality.
+  /// particles the stronger the thinner that is, see spacing_of_strengths.
   double strength_in_model() const {
     const nlohmann::json& truth = result->at("truth");
     const double strength = number_at(truth, "/strength");
-    const double layers = 1e3 * EffectReality::spacing_of_strengths / number_at(*result, "/settings/model_spacing_mm");
+    const double layers = 1e3 * spacing_of_strengths / number_at(*result, "/settings/model_spacing_mm");
     const std::string name = truth.at("effect");
     return name == "gravity"         ? 9.81 * (1 + strength)
            : name == "fill"          ? 1 + strength

@@ -3,7 +3,8 @@
 
 /// A twin of pours in which one effect is hidden that the model lacks, or an error of the measurement, or something
 /// that no model is told of: for workflows that are to name it. The reality has the model's family of solver, with
-/// another kernel, spacing and sub-steps, and differs from what was recorded by small errors that are tolerated.
+/// another kernel, spacing and sub-steps, or another solver altogether, and differs from what was recorded by small
+/// errors that are tolerated.
 
 #include <algorithm>
 #include <array>
@@ -13,12 +14,14 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -37,6 +40,7 @@
 #include <decant/io/png.hpp>
 #include <decant/io/recording_writer.hpp>
 #include <decant/pressure/dfsph.hpp>
+#include <decant/pressure/position_based.hpp>
 #include <decant/simulation/fill.hpp>
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/simulator.hpp>
@@ -50,8 +54,21 @@
 
 namespace example {
 
+/// By what a reality is simulated.
+enum class RealitySolver {
+  DivergenceFree,  ///< as the model is
+  PositionBased    ///< foreign to the model: liquid that gives way, splashes less and clings more
+};
+
+inline const std::map<std::string, RealitySolver>& reality_solvers() {
+  static const std::map<std::string, RealitySolver> solvers{{"divergence_free", RealitySolver::DivergenceFree},
+                                                            {"position_based", RealitySolver::PositionBased}};
+  return solvers;
+}
+
 /// How a case is recorded. What a workflow gets depends on none of it but the spacing and the seconds.
 struct EffectRecordingSettings {
+  RealitySolver solver = RealitySolver::DivergenceFree;
   double spacing = 0.0043;                                   ///< of the reality's particles [m]
   double longest = std::numeric_limits<double>::infinity();  ///< a pour is cut off there [s]
   bool with_effect = true;   ///< false: the same errors and noise, but nothing is hidden
@@ -61,20 +78,23 @@ struct EffectRecordingSettings {
 
 /// All effects are there, and cost nothing where they are zero.
 // SHEAR_THINNING: replace Viscosity by the force that has both, and set it in EffectReality::set_forces
-struct EffectRealityParts : RealityParts<decant::Dfsph<float>> {
+template <class PressureSolverType>
+struct EffectRealityParts : RealityParts<PressureSolverType> {
   using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
                             decant::LinearDrag<float>, decant::QuadraticDrag<float>, decant::BodyAcceleration<float>,
                             decant::Suction<float>, decant::WallFriction<float>, decant::WallAdhesion<float>,
                             decant::SurfaceTension<float>, BackPressure, Stirrer, StickyPatch, Puff, ShakingTable>;
 };
 
+/// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
+/// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
+inline constexpr double spacing_of_strengths = 0.005;
+
 /// What really happens in one pour of a case.
+template <class PressureSolverType>
 class EffectReality {
  public:
-  using Model = decant::Simulator<EffectRealityParts>;
-  /// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
-  /// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
-  static constexpr double spacing_of_strengths = 0.005;
+  using Model = decant::Simulator<EffectRealityParts<PressureSolverType>>;
 
   /// @param effect that of the case, or nothing. @param recorded_volume what the recording will say [m^3].
   EffectReality(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which, double recorded_volume,
@@ -91,7 +111,17 @@ class EffectReality {
     pan_body_ = model_.add_body("pan", scenario_.pan.shape(), pan_motion_);
     set_lasting_forces();
     const double amount = (1 + errors_.fill) * (1 + (effect_.is("fill") ? effect_.strength : 0));
-    filled_ = fill(model_, container_body_, FillAmount::volume(amount * recorded_volume));
+    if constexpr (std::is_same_v<PressureSolverType, Dfsph<float>>) {
+      initial_volume_ = fill(model_, container_body_, FillAmount::volume(amount * recorded_volume)).volume;
+    } else {
+      // others start badly from liquid that was packed, and what one takes for settled is not at rest for another
+      const EffectReality<Dfsph<float>> settled(hidden, effect, which, recorded_volume, spacing);
+      initial_volume_ = settled.initial_volume();
+      Model calming = model_;
+      calming.add_particles(settled.model().fluid().position, settled.model().fluid().velocity, container_body_);
+      step_reality(calming, 0.1, 0);
+      model_.add_particles(calming.fluid().position, calming.fluid().velocity, container_body_);
+    }
     model_.watch_contents(container_body_);
     model_.watch_contents(pan_body_);
     model_.set_motion(container_body_, container_motion_);
@@ -101,7 +131,7 @@ class EffectReality {
 
   const Model& model() const { return model_; }
   const ToleratedErrors& errors() const { return errors_; }
-  double initial_volume() const { return filled_.volume; }                 ///< [m^3]
+  double initial_volume() const { return initial_volume_; }                ///< [m^3]
   double removed() const { return drain_ ? drain_->removed() : leaked_; }  ///< by a leak or a loss [m^3]
   /// Where the effect is, what it does and when.
   const nlohmann::json& description() const { return description_; }
@@ -182,10 +212,11 @@ class EffectReality {
   void set_lasting_forces() {
     using namespace decant;
     const double layers = spacing_of_strengths / model_.spacing();
-    model_.force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
-    model_.force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
-    model_.force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
-    model_.force<WallAdhesion<float>>().strength = static_cast<float>(layers * layers * strength_if("wall_adhesion"));
+    model_.template force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
+    model_.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
+    model_.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
+    model_.template force<WallAdhesion<float>>().strength =
+        static_cast<float>(layers * layers * strength_if("wall_adhesion"));
     if (effect_.is("lateral_force", "steady")) {
       pull_sideways(0, 0);
     }
@@ -199,12 +230,12 @@ class EffectReality {
       // beside the jet, so that it is drawn aside and not caught
       const Vector3<double> point =
           scenario_.jet(0.55) + 0.045 * effect_.side * scenario_.across() + 0.008 * effect_.displacement;
-      Suction<float>& suction = model_.force<Suction<float>>();
+      Suction<float>& suction = model_.template force<Suction<float>>();
       suction.strength = static_cast<float>(effect_.strength);
       suction.point = point.cast<float>();
       say("world", point);
     } else if (effect_.is("back_pressure")) {
-      BackPressure& air = model_.force<BackPressure>();
+      BackPressure& air = model_.template force<BackPressure>();
       air.strength = effect_.strength;
       air.frequency = effect_.frequency;
       air.onset = effect_.onset - 0.3;
@@ -216,14 +247,14 @@ class EffectReality {
       description_["frequency_hz"] = air.frequency;
       description_["onset_s"] = air.onset;
     } else if (effect_.is("stirrer")) {
-      Stirrer& stirrer = model_.force<Stirrer>();
+      Stirrer& stirrer = model_.template force<Stirrer>();
       stirrer.speed = effect_.side * effect_.strength;
       stirrer.onset = effect_.onset;
       stirrer.foot = scenario_.pan.floor_below(0.015 * effect_.displacement);
       say("pan", stirrer.foot);
       description_["onset_s"] = effect_.onset;
     } else if (effect_.is("sticky_patch")) {
-      StickyPatch& patch = model_.force<StickyPatch>();
+      StickyPatch& patch = model_.template force<StickyPatch>();
       patch.rate = spacing_of_strengths / model_.spacing() * effect_.strength;
       patch.body = container_body_;
       patch.side = effect_.side * Vector3<double>::UnitY();
@@ -231,7 +262,7 @@ class EffectReality {
       say("container", {0, 0, 0});
       description_["direction"] = vector_json(patch.side);
     } else if (effect_.is("puff")) {
-      Puff& puff = model_.force<Puff>();
+      Puff& puff = model_.template force<Puff>();
       puff.strength = effect_.strength;
       puff.from = effect_.onset;
       puff.until = effect_.until;
@@ -239,7 +270,7 @@ class EffectReality {
       say("pan", puff.foot);
       say_window();
     } else if (effect_.is("shaking_table")) {
-      ShakingTable& table = model_.force<ShakingTable>();
+      ShakingTable& table = model_.template force<ShakingTable>();
       table.size = effect_.strength * effect_.level_direction();
       table.frequency = effect_.frequency;
       table.from = effect_.onset - 0.4;
@@ -310,7 +341,7 @@ class EffectReality {
   }
 
   void pull_sideways(double from, double until) {
-    auto& pull = model_.force<decant::BodyAcceleration<float>>();
+    auto& pull = model_.template force<decant::BodyAcceleration<float>>();
     const decant::Vector3<double> direction = effect_.level_direction();
     pull.pull = (effect_.strength * direction).cast<float>();
     description_["direction"] = vector_json(direction);
@@ -347,7 +378,7 @@ class EffectReality {
   decant::PoseTrack container_motion_, pan_motion_;
   Model model_;
   decant::BodyId container_body_ = 0, pan_body_ = 0;
-  decant::FillReport filled_{};
+  double initial_volume_ = 0;  ///< [m^3]
   std::optional<Drain> drain_{};
   double leaked_ = 0;  ///< [m^3]
   nlohmann::json description_ = nlohmann::json::object();
@@ -372,8 +403,9 @@ inline std::pair<decant::PinholeCamera, decant::Pose> true_camera(const EffectSc
 }
 
 /// The truth about a recording, for scoring alone.
-inline nlohmann::json effect_truth(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which,
-                                   const EffectReality& reality) {
+template <class Reality>
+nlohmann::json effect_truth(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which,
+                            const Reality& reality, RealitySolver solver) {
   const auto vector = [](const decant::Vector3<double>& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
   const ToleratedErrors& errors = reality.errors();
   const Eigen::AngleAxisd turn(errors.container_error.rotation);
@@ -406,25 +438,24 @@ inline nlohmann::json effect_truth(const EffectCase& hidden, const HiddenEffect&
                         {"container_offset_m", vector(errors.container_error.translation)},
                         {"container_turn_deg", turn.angle() * 180 / std::numbers::pi},
                         {"pull_m_s2", vector(errors.pull)}};
-  truth["solver"] = "divergence-free, another kernel";
+  truth["solver"] = solver == RealitySolver::DivergenceFree ? "divergence-free, another kernel" : "position-based";
   truth["spacing_mm"] = 1e3 * reality.model().spacing();
   truth["initial_ml"] = 1e6 * reality.initial_volume();
   return truth;
 }
 
-/// Records one pour of a case in a new folder. The recording's name tells the scenario and the pour, nothing else.
-/// @param which 0: a, to learn from; 1: b, to be predicted. @param progress is told how far it is, 0 .. 1.
-/// Throws std::invalid_argument and std::runtime_error.
-inline void record_effect_pour(
-    const EffectCase& hidden, std::size_t which, const std::filesystem::path& folder,
-    const EffectRecordingSettings& settings = {}, const std::function<void(double)>& progress = [](double) {}) {
+namespace detail {
+
+template <class PressureSolverType>
+void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::filesystem::path& folder,
+                        const EffectRecordingSettings& settings, const std::function<void(double)>& progress) {
   using namespace decant;
   const EffectScenario& scenario = effect_scenarios().at(hidden.scenario);
   const PourPlan& plan = scenario.pours.at(which);
   const HiddenEffect effect = settings.with_effect ? hidden.effect : HiddenEffect{};
   const BodyShape container = effect_container(plan.container).shape;
   const double recorded_volume = 1e-7 * std::round(1e7 * plan.fill * Cavity(container.mesh).volume());
-  EffectReality reality(hidden, effect, which, recorded_volume, settings.spacing);
+  EffectReality<PressureSolverType> reality(hidden, effect, which, recorded_volume, settings.spacing);
 
   Recording header;
   header.name = "scenario" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
@@ -439,7 +470,7 @@ inline void record_effect_pour(
   const auto [camera, camera_from_world] = true_camera(scenario, effect);
   TwinSight sight(camera, camera_from_world, {0, 0, 0}, reality.model());
   RecordedMotion recorded(hidden.scenario, which);
-  const std::uint32_t noise_seed = detail::mixed_seed({hidden.seed, 99U, static_cast<std::uint32_t>(which)});
+  const std::uint32_t noise_seed = mixed_seed({hidden.seed, 99U, static_cast<std::uint32_t>(which)});
   MaskNoise noise(noise_seed);
   std::mt19937 drops(noise_seed);
 
@@ -468,12 +499,27 @@ inline void record_effect_pour(
     writer.add_frame(frame);
     progress(static_cast<double>(number + 1) / frames);
   }
-  nlohmann::json truth = effect_truth(hidden, effect, which, reality);
+  nlohmann::json truth = effect_truth(hidden, effect, which, reality, settings.solver);
   truth["recorded_ml"] = 1e6 * recorded_volume;
   truth["removed_ml"] = 1e6 * reality.removed();
   truth["volume_ml"] = {{plan.container, container_ml}, {"pan", pan_ml}};
   writer.set_truth(truth.dump());
   writer.finish();
+}
+
+}  // namespace detail
+
+/// Records one pour of a case in a new folder. The recording's name tells the scenario and the pour, nothing else.
+/// @param which 0: a, to learn from; 1: b, to be predicted. @param progress is told how far it is, 0 .. 1.
+/// Throws std::invalid_argument and std::runtime_error.
+inline void record_effect_pour(
+    const EffectCase& hidden, std::size_t which, const std::filesystem::path& folder,
+    const EffectRecordingSettings& settings = {}, const std::function<void(double)>& progress = [](double) {}) {
+  if (settings.solver == RealitySolver::PositionBased) {
+    detail::record_effect_pour<decant::PositionBased<float>>(hidden, which, folder, settings, progress);
+  } else {
+    detail::record_effect_pour<decant::Dfsph<float>>(hidden, which, folder, settings, progress);
+  }
 }
 
 }  // namespace example
