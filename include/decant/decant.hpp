@@ -66,6 +66,7 @@
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 #include <decant/coverage/warp_sum.hpp>
+#include <decant/discovery/compared_recordings.hpp>
 #include <decant/discovery/disagreement.hpp>
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/effect_curve.hpp>
@@ -74,9 +75,13 @@
 #include <decant/discovery/effect_judgement.hpp>
 #include <decant/discovery/effect_location.hpp>
 #include <decant/discovery/effect_refinement.hpp>
+#include <decant/discovery/effect_refiner.hpp>
 #include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/interaction_runs.hpp>
 #include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/missing_effect.hpp>
+#include <decant/discovery/missing_effect_result.hpp>
+#include <decant/discovery/missing_effect_settings.hpp>
 #include <decant/discovery/nuisance_space.hpp>
 #include <decant/discovery/silhouette_features.hpp>
 #include <decant/discovery/silhouette_gap.hpp>

@@ -156,25 +156,55 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
   }
 }
 
-TEST_CASE("missing effect: references say how far reality is from the model where nothing is missing") {
+TEST_CASE("missing effect: what reality always does differently is learnt from references of the same interaction") {
   // a gust that the catalogue does not have blows in every pour
+  const double foreign = 1;  // [m/s^2]
   const JetModel model(0.9);
   ThreadExecutor executor{{1}};
-  const auto found = [&](const Jet& jet, std::vector<Interaction<JetModel>> references) {
-    return MissingEffectSearch<JetModel>({{"a", &model, film_of(jet, 61, 0.9)}}, {}, run_jobs_on(executor), {},
-                                         std::move(references))
-        .find();
-  };
-  const double foreign = 2;  // [m/s^2]
-  const MissingEffect alone = found({0, 0, 1, 0, foreign}, {});
-  CHECK(alone.verdict == Verdict::Unexplained);
   std::vector<Interaction<JetModel>> references;
   for (const std::uint32_t seed : {62U, 63U, 64U}) {
     references.push_back({"reference " + std::to_string(seed), &model, film_of({0, 0, 1, 0, foreign}, seed, 0.9)});
   }
-  CHECK(found({0, 0, 1, 0, foreign}, references).verdict == Verdict::Nothing);
+  const auto found = [&](const Jet& jet, std::uint32_t seed, std::size_t count) {
+    return MissingEffectSearch<JetModel>({{"a", &model, film_of(jet, seed, 0.9)}}, {}, run_jobs_on(executor), {},
+                                         {references.begin(), references.begin() + static_cast<std::ptrdiff_t>(count)})
+        .find();
+  };
+  for (const std::uint32_t seed : {61U, 65U}) {
+    const MissingEffect alone = found({0, 0, 1, 0, foreign}, seed, 0);
+    CHECK(alone.verdict == Verdict::Unexplained);
+    CHECK(alone.taught_by == 0);
+    const MissingEffect taught = found({0, 0, 1, 0, foreign}, seed, 3);
+    CHECK(taught.verdict == Verdict::Nothing);
+    CHECK(taught.taught_by == 3);
+    CHECK(taught.learn.before < 0.5 * alone.learn.before);
+    // what else is there is still seen
+    const MissingEffect faster = found({0, 0, 1.06, 0, foreign}, seed, 3);
+    CHECK(faster.verdict == Verdict::Named);
+    CHECK(name_of(faster) == "speed");
+  }
+  // a single one may be off by its own noise as well
+  CHECK(found({0, 0, 1, 0, foreign}, 61, 1).taught_by == 0);
+}
+
+TEST_CASE("missing effect: references of other interactions say how far reality is from the model") {
+  const double foreign = 2;  // [m/s^2]
+  const JetModel model(0.9), other(1.0);
+  ThreadExecutor executor{{1}};
+  std::vector<Interaction<JetModel>> references;
+  for (const std::uint32_t seed : {62U, 63U, 64U}) {
+    references.push_back({"reference " + std::to_string(seed), &other, film_of({0, 0, 1, 0, foreign}, seed, 1.0)});
+  }
+  const auto found = [&](const Jet& jet) {
+    return MissingEffectSearch<JetModel>({{"a", &model, film_of(jet, 61, 0.9)}}, {}, run_jobs_on(executor), {},
+                                         references)
+        .find();
+  };
+  const MissingEffect nothing = found({0, 0, 1, 0, foreign});
+  CHECK(nothing.verdict == Verdict::Nothing);
+  CHECK(nothing.taught_by == 0);
   // what goes beyond that is not taken for it
-  CHECK(found({1.4, 0, 1, 0, foreign}, references).verdict != Verdict::Nothing);
+  CHECK(found({0, 0.8, 1, 0, foreign}).verdict != Verdict::Nothing);
 }
 
 TEST_CASE("missing effect: two at once are found one after another") {

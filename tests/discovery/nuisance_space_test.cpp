@@ -137,13 +137,20 @@ TEST_CASE("nuisance space: what reality always does differently is learnt from r
   CHECK(without.distance(without.standardised(seen)) > 20);
   double others = 0;
   for (int k = 0; k < 20; ++k) {
-    others += with.distance(with.standardised(reality())) / 20;
+    others += with.distance(with.standardised(with.as_modelled(reality()))) / 20;
   }
   CHECK(others < 2);  // 4 / 3, as the mean of three references is off too, and what is not known of common directions
-  CHECK(with.distance(with.standardised(seen + 6 * effect)) > 2);
-  CHECK((with.center() - world.mean - always).norm() < 0.5 * always.norm());
+  CHECK(with.distance(with.standardised(with.as_modelled(seen + 6 * effect))) > 2);
+  CHECK((with.as_modelled(world.mean + always) - world.mean).norm() < 0.5 * always.norm());
+  CHECK(with.center().isApprox(without.center()));
   // half of it may not carry over to another pour
-  CHECK(with.distance(with.standardised(world.draws(1).col(0) + 0.5 * always)) < 2);
+  CHECK(with.distance(with.standardised(with.as_modelled(world.draws(1).col(0) + 0.5 * always))) < 2);
+  // without the first reference: as if there had been two
+  NuisanceSample two = sample;
+  two.references = sample.references.rightCols(2);
+  const NuisanceSpace rest(sample.without_reference(0));
+  CHECK(rest.as_modelled(seen).isApprox(NuisanceSpace(two).as_modelled(seen)));
+  CHECK(!rest.as_modelled(seen).isApprox(with.as_modelled(seen)));
 }
 
 TEST_CASE("nuisance space: what differs between references is no effect") {

@@ -11,6 +11,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -49,24 +50,32 @@ struct RecordedEvidenceSettings {
   NuisanceSettings nuisance{};
 };
 
+/// A recording in which nothing is missing, and runs of a model of it: baselines and draws.
+struct ReferenceRecording {
+  std::vector<SilhouetteSeries> recording{};     ///< by camera
+  const EffectDictionary* dictionary = nullptr;  ///< has to outlive those that it is given to
+};
+
 /// Compares a recording with a dictionary of the same interaction.
 class RecordedEvidence {
  public:
   using Series = std::vector<SilhouetteSeries>;
 
-  /// @param recording by camera. @param dictionary has to outlive it.
+  /// @param recording by camera. @param dictionary has to outlive it. @param references of interactions that the model
+  /// predicts alike(): what they are off from their predictions is taken off what was recorded, see NuisanceSpace.
   /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras or frames are others.
-  RecordedEvidence(Series recording, const EffectDictionary& dictionary, const RecordedEvidenceSettings& settings = {})
+  RecordedEvidence(Series recording, const EffectDictionary& dictionary, const RecordedEvidenceSettings& settings = {},
+                   std::vector<ReferenceRecording> references = {})
       : recording_(std::move(recording)),
         dictionary_(&dictionary),
         settings_(settings),
+        references_(std::move(references)),
         features_(recording_, working(dictionary), settings.features) {
     const std::vector<std::size_t> baselines = dictionary.of_role(RunRole::Baseline);
     draws_ = dictionary.of_role(RunRole::Draw);
     expects(!baselines.empty(), "RecordedEvidence: baselines that worked", "at least one", "none");
     expects(draws_.size() >= 5, "RecordedEvidence: draws that worked", "at least 5", draws_.size());
     expects(features_.size() > 0, "RecordedEvidence: liquid in the recording or in runs", "some", "none");
-    own_ = features_.of(recording_);
     for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
       if (dictionary.worked(run)) {
         of_run_[run] = features_.of(dictionary.seen[run]);
@@ -85,18 +94,37 @@ class RecordedEvidence {
     if (baselines.front() == 0) {
       sample_.templates = columns(dictionary.of_role(RunRole::Template)).colwise() - of_run_.at(0);
     }
-    sample_.references.resize(sample_.draws.rows(), 0);
+    sample_.references.resize(sample_.draws.rows(), static_cast<Eigen::Index>(references_.size()));
+    for (std::size_t k = 0; k < references_.size(); ++k) {
+      sample_.references.col(static_cast<Eigen::Index>(k)) = residual(references_[k]);
+    }
     space_ = std::make_unique<NuisanceSpace>(sample_, settings.nuisance);
+    own_ = space_->as_modelled(features_.of(recording_));
   }
 
   const SilhouetteFeatures& features() const noexcept { return features_; }
   const NuisanceSpace& space() const noexcept { return *space_; }
   std::size_t draws() const noexcept { return draws_.size(); }
 
+  std::size_t references() const noexcept { return references_.size(); }
+
   /// How far the recording is off what is expected, by feature, in standard deviations.
   Eigen::VectorXd standardised() const { return space_->standardised(own_); }
+  /// What a model would have to predict for what was recorded.
   const Eigen::VectorXd& recorded_features() const noexcept { return own_; }
   const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
+
+  /// The mean features of runs, by run and camera; nothing if one of them failed.
+  std::optional<Eigen::VectorXd> mean_features(std::span<const Series> runs) const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features_.size()));
+    for (const Series& run : runs) {
+      if (run.empty()) {
+        return std::nullopt;
+      }
+      sum += features_.of(run);
+    }
+    return sum / static_cast<double>(runs.size());
+  }
 
   /// What an effect changes; nothing where nothing is known of it. This has to outlive it.
   std::optional<EffectCurve> curve(std::size_t effect) const {
@@ -116,6 +144,30 @@ class RecordedEvidence {
   /// What the recording says.
   EffectEvidence of_recording() const { return evidence(recording_, own_, *space_); }
 
+  /// How much a reference would look like this interaction, as the model has both: the distance between predictions
+  /// where nothing is missing, about 1 for what is within tolerances. Infinite where cameras or frames are others.
+  double unlikeness(const ReferenceRecording& reference) const {
+    bool same = features_.fit(reference.recording);
+    for (std::size_t camera = 0; same && camera < recording_.size(); ++camera) {
+      const SilhouetteSeries &own = recording_[camera], &other = reference.recording[camera];
+      for (std::size_t frame = 1; same && frame < own.frames(); ++frame) {
+        const double passed = own.time(frame) - own.time(0);
+        const double between = own.time(frame) - own.time(frame - 1);
+        same = std::abs(other.time(frame) - other.time(0) - passed) < 0.5 * between;
+      }
+    }
+    return same ? space_->distance(space_->standardised(expected(*reference.dictionary)))
+                : std::numeric_limits<double>::infinity();
+  }
+
+  /// What one of the references would say as the recording, if there were only the others.
+  EffectEvidence of_reference(std::size_t reference) const {
+    const auto k = static_cast<Eigen::Index>(reference);
+    const NuisanceSpace rest(sample_.without_reference(k), settings_.nuisance);
+    return evidence(references_.at(reference).recording, rest.as_modelled(rest.center() + sample_.references.col(k)),
+                    rest);
+  }
+
   /// What one of the draws would say as the recording, to a dictionary that does not have it.
   EffectEvidence of_draw(std::size_t draw) const {
     const std::size_t run = draws_.at(draw);
@@ -132,6 +184,32 @@ class RecordedEvidence {
       }
     }
     return result;
+  }
+
+  /// What a model predicts where nothing is missing, as NuisanceSpace::center has it.
+  Eigen::VectorXd expected(const EffectDictionary& of) const {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features_.size()));
+    for (const RunRole role : {RunRole::Baseline, RunRole::Draw}) {
+      const std::vector<std::size_t> runs = of.of_role(role);
+      expects(!runs.empty(), "RecordedEvidence: baselines and draws of a reference that worked", "at least one",
+              "none");
+      for (const std::size_t run : runs) {
+        sum += 0.5 / static_cast<double>(runs.size()) * features_.of(of.seen[run]);
+      }
+    }
+    return sum;
+  }
+
+  /// Nothing is known of what the reference's cameras did not see.
+  Eigen::VectorXd residual(const ReferenceRecording& reference) const {
+    Eigen::VectorXd off = features_.of(reference.recording) - expected(*reference.dictionary);
+    const std::vector<bool> seen = features_.seen_in(reference.recording);
+    for (std::size_t k = 0; k < seen.size(); ++k) {
+      if (!seen[k]) {
+        off[static_cast<Eigen::Index>(k)] = 0;
+      }
+    }
+    return off;
   }
 
   /// Numbers of the effect's runs, if they say something of each component.
@@ -240,9 +318,10 @@ class RecordedEvidence {
   Series recording_;
   const EffectDictionary* dictionary_;
   RecordedEvidenceSettings settings_;
+  std::vector<ReferenceRecording> references_{};
   SilhouetteFeatures features_;
   std::vector<std::size_t> draws_{};
-  Eigen::VectorXd own_{};  ///< features of the recording
+  Eigen::VectorXd own_{};  ///< features of the recording, see recorded_features
   std::map<std::size_t, Eigen::VectorXd> of_run_{};
   NuisanceSample sample_{};
   std::unique_ptr<NuisanceSpace> space_{};

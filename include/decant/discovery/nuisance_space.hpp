@@ -25,9 +25,18 @@ struct NuisanceSample {
 
   /// The same as if one of the draws had not been made.
   NuisanceSample without_draw(Eigen::Index draw) const {
-    NuisanceSample rest{baseline, Eigen::MatrixXd(draws.rows(), draws.cols() - 1), templates, references};
-    rest.draws.leftCols(draw) = draws.leftCols(draw);
-    rest.draws.rightCols(rest.draws.cols() - draw) = draws.rightCols(rest.draws.cols() - draw);
+    return {baseline, without_column(draws, draw), templates, references};
+  }
+  /// Or one of the references.
+  NuisanceSample without_reference(Eigen::Index reference) const {
+    return {baseline, draws, templates, without_column(references, reference)};
+  }
+
+ private:
+  static Eigen::MatrixXd without_column(const Eigen::MatrixXd& all, Eigen::Index column) {
+    Eigen::MatrixXd rest(all.rows(), all.cols() - 1);
+    rest.leftCols(column) = all.leftCols(column);
+    rest.rightCols(rest.cols() - column) = all.rightCols(rest.cols() - column);
     return rest;
   }
 };
@@ -46,8 +55,9 @@ struct NuisanceSettings {
 /// degrees of freedom that are left), and w_m the templates, t times their size. Distances are z' Sigma^-1 z / p, about
 /// 1 for a draw that the space was not made of: one that is among its draws is far nearer, so calibrate on
 /// NuisanceSample::without_draw. Generalised least squares (Rao, Linear Statistical Inference, 1973, section 4a), with
-/// the covariance of factor analysis. References shift f by their mean residual; that half of it may not carry over,
-/// and what they scatter, is added to what varies. A single direction that varies counts for next to nothing among p
+/// the covariance of factor analysis. The mean residual of references is what reality does differently whatever is
+/// missing: take it off what was recorded (as_modelled). That half of it may not carry over, and what they scatter, is
+/// added to what varies. A single direction that varies counts for next to nothing among p
 /// features, however large.
 class NuisanceSpace {
  public:
@@ -59,16 +69,16 @@ class NuisanceSpace {
     check(sample, settings);
     const Eigen::Index features = sample.draws.rows();
     center_ = 0.5 * (sample.baseline.rowwise().mean() + sample.draws.rowwise().mean());
+    always_ = Vector::Zero(features);
     Matrix off = sample.draws.colwise() - center_;
     Matrix templates = sample.templates;
     Vector variance = off.array().square().rowwise().mean() + settings.floor * settings.floor;
     if (sample.references.cols() > 0) {
-      const Vector shift = sample.references.rowwise().mean();
-      const Matrix scatter = sample.references.colwise() - shift;
-      center_ += shift;
-      variance.array() += scatter.array().square().rowwise().mean() + 0.25 * shift.array().square();
+      always_ = sample.references.rowwise().mean();
+      const Matrix scatter = sample.references.colwise() - always_;
+      variance.array() += scatter.array().square().rowwise().mean() + 0.25 * always_.array().square();
       append(off, scatter);
-      append(templates, 0.5 * shift / std::max(settings.template_deviation, 1e-300));
+      append(templates, 0.5 * always_ / std::max(settings.template_deviation, 1e-300));
     }
     inverse_deviation_ = variance.array().rsqrt();
     off = inverse_deviation_.asDiagonal() * off;
@@ -95,8 +105,10 @@ class NuisanceSpace {
   }
 
   Eigen::Index features() const noexcept { return center_.size(); }
-  /// What is expected where nothing is missing.
+  /// What the model predicts where nothing is missing.
   const Vector& center() const noexcept { return center_; }
+  /// What a model would have to predict for features that were recorded: without what references are off from theirs.
+  Vector as_modelled(const Vector& recorded) const { return recorded - always_; }
   /// Variance of standardised features beyond what they have in common.
   double noise() const noexcept { return noise_; }
 
@@ -161,6 +173,7 @@ class NuisanceSpace {
   }
 
   Vector center_;
+  Vector always_;  ///< mean residual of references
   Vector inverse_deviation_;
   Matrix direction_;
   Vector taken_;

@@ -72,6 +72,16 @@ class SilhouetteFeatures {
   std::size_t size() const noexcept { return places_.size(); }
   const Place& place(std::size_t feature) const { return places_.at(feature); }
 
+  /// Whether a series has the recording's cameras, cells and frames.
+  bool fit(const Series& series) const noexcept {
+    bool all = series.size() == views_.size();
+    for (std::size_t camera = 0; all && camera < views_.size(); ++camera) {
+      all = series[camera].frames() == views_[camera].frames && rows_of(series[camera]) == views_[camera].rows &&
+            columns_of(series[camera]) == views_[camera].columns;
+    }
+    return all;
+  }
+
   /// Of the recording or a simulation. Throws std::invalid_argument if its cameras or frames are others.
   Eigen::VectorXd of(const Series& series) const {
     check(series);
@@ -81,6 +91,21 @@ class SilhouetteFeatures {
       const Eigen::VectorXd all = pooled(series[camera], views_[camera]);
       for (const Eigen::Index which : views_[camera].chosen) {
         result[filled++] = all[which];
+      }
+    }
+    return result;
+  }
+
+  /// By feature, whether a series' cameras saw all frames of it. Throws as of() does.
+  std::vector<bool> seen_in(const Series& series) const {
+    check(series);
+    std::vector<bool> result;
+    for (std::size_t camera = 0; camera < views_.size(); ++camera) {
+      const View& view = views_[camera];
+      for (const Eigen::Index which : view.chosen) {
+        const Window& window = view.windows[static_cast<std::size_t>(which / (view.rows * view.columns))];
+        result.push_back(std::all_of(window.frames.begin(), window.frames.end(),
+                                     [&](std::size_t frame) { return series[camera].seen(frame); }));
       }
     }
     return result;
@@ -161,11 +186,8 @@ class SilhouetteFeatures {
 
   void check(const Series& series) const {
     expects(series.size() == views_.size(), "SilhouetteFeatures: cameras", "those of the recording", series.size());
-    for (std::size_t camera = 0; camera < views_.size(); ++camera) {
-      expects(series[camera].frames() == views_[camera].frames && rows_of(series[camera]) == views_[camera].rows &&
-                  columns_of(series[camera]) == views_[camera].columns,
-              "SilhouetteFeatures: frames and cells", "those of the recording", series[camera].frames());
-    }
+    expects(fit(series), "SilhouetteFeatures: frames and cells", "those of the recording",
+            series.empty() ? 0 : series.front().frames());
   }
 
   SilhouetteFeatureSettings settings_;

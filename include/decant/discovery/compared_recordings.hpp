@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Recordings beside dictionaries of runs: what they say of each effect, and what chance says.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/core/target.hpp>
+#include <decant/discovery/disagreement.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/effect_evidence.hpp>
+#include <decant/discovery/effect_judgement.hpp>
+#include <decant/discovery/effect_location.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/interaction_runs.hpp>
+#include <decant/discovery/missing_effect_settings.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// What recordings say of a model.
+struct ComparedRecordings {
+  std::vector<Effect> effects{};      ///< of which there are runs
+  std::vector<std::size_t> number{};  ///< of each among the model's
+  std::vector<EffectDictionary> dictionary{};
+  std::vector<RecordedEvidence> recorded{};
+  std::vector<EffectEvidence> evidence{};
+  ChanceLevel chance{};
+};
+
+/// What is left of recordings with the mean of some runs in place of the model as it is: mean distances, set after set.
+/// Infinite where a run failed.
+/// @param runs `seeds` of them for each recording in turn, set after set.
+template <ForwardModel Model>
+std::vector<double> distances_left(InteractionRuns<Model>& make,
+                                   const std::vector<typename InteractionRuns<Model>::Run>& runs, std::size_t seeds,
+                                   const std::vector<RecordedEvidence>& recorded) {
+  const std::vector<typename InteractionRuns<Model>::Series> seen = make(runs);
+  std::vector<double> result;
+  for (const auto* next = seen.data(); next < seen.data() + seen.size();) {
+    double sum = 0;
+    for (const RecordedEvidence& of : recorded) {
+      const auto middle = of.mean_features({next, seeds});
+      next += seeds;
+      if (middle) {
+        sum += of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
+      } else {
+        sum = std::numeric_limits<double>::infinity();
+      }
+    }
+    result.push_back(sum / static_cast<double>(recorded.size()));
+  }
+  return result;
+}
+
+/// Runs dictionaries and compares recordings with them.
+template <ForwardModel Model>
+class RecordingComparison {
+ public:
+  /// @param runs has to outlive it. @param references see MissingEffectSearch.
+  RecordingComparison(InteractionRuns<Model>& runs, MissingEffectSettings settings,
+                      std::vector<Interaction<Model>> references)
+      : runs_(&runs), settings_(std::move(settings)), references_(std::move(references)) {}
+
+  /// Predicts references. Before anything else.
+  void consult_references() {
+    std::vector<EffectDictionary> dictionaries;  // references are judged without any
+    for (const Interaction<Model>& each : references_) {
+      ComparedRecordings known = (*this)({each}, {}, settings_.dictionary);
+      unlike_.include(known.evidence.front(), known.chance);
+      dictionaries.push_back(std::move(known.dictionary.front()));
+    }
+    reference_dictionaries_ = std::move(dictionaries);
+  }
+
+  /// Runs a dictionary of each interaction, and compares its recording with it.
+  /// @param of have to outlive what is returned. @param effects of which there are runs; none where only the gap is
+  /// asked about. @param added see plan_dictionary.
+  ComparedRecordings operator()(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
+                                const DictionarySettings& settings, const std::vector<AppliedEffect>& added = {}) {
+    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings, added);
+    std::vector<Run> runs;
+    for (const Interaction<Model>& each : of) {
+      for (const PlannedRun& planned : plan) {
+        runs.emplace_back(&each, planned.run);
+      }
+    }
+    const std::vector<Series> seen = (*runs_)(runs);
+    ComparedRecordings known;
+    known.effects = effects;
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      known.number.push_back(k);
+    }
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
+      known.dictionary.push_back({effects, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
+    }
+    compare(of, known);
+    return known;
+  }
+
+  /// Effects that are seen first where they act are tried where recordings begin to disagree, too: a jet that does not
+  /// overlap with the one that there is says nothing of it. @param where by recording. @return whether there are any.
+  bool locate(const std::vector<Interaction<Model>>& of, const std::vector<std::vector<Disagreement>>& where,
+              ComparedRecordings& known) {
+    if constexpr (LocatingModel<Model>) {
+      std::vector<const Model*> models;
+      for (const Interaction<Model>& each : of) {
+        models.push_back(each.model);
+      }
+      const std::vector<AppliedEffect> places = located_effects(models, where);
+      if (places.empty()) {
+        return false;
+      }
+      std::vector<PlannedRun> plan;
+      std::uint32_t seed = 4001;
+      for (const AppliedEffect& at : places) {
+        Effect& effect = known.effects.emplace_back(of.front().model->effects()[at.effect]);
+        known.number.push_back(at.effect);
+        effect.place = at.place;
+        effect.where = "where recordings begin to disagree";
+        if (at.window) {
+          effect.window = at.window;
+          effect.window_tolerance = std::min(effect.window_tolerance, detail::latest_sight);
+        }
+        for (const double share : settings_.dictionary.shares) {
+          PlannedRun planned{RunRole::Effect, known.effects.size() - 1, {{at}, seed++, false}};
+          planned.run.effects.back().strength = effect.base();
+          const EffectComponent& component = effect.components.front();
+          planned.run.effects.back().strength[0] += share * (component.high - component.base);
+          plan.push_back(std::move(planned));
+        }
+      }
+      std::vector<Run> runs;
+      for (const Interaction<Model>& each : of) {
+        for (const PlannedRun& planned : plan) {
+          runs.emplace_back(&each, planned.run);
+        }
+      }
+      const std::vector<Series> seen = (*runs_)(runs);
+      for (std::size_t k = 0; k < of.size(); ++k) {
+        EffectDictionary& dictionary = known.dictionary[k];
+        dictionary.effects = known.effects;
+        dictionary.runs.insert(dictionary.runs.end(), plan.begin(), plan.end());
+        const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
+        dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
+      }
+      compare(of, known);
+      return true;
+    }
+    return false;
+  }
+
+ private:
+  using Series = typename InteractionRuns<Model>::Series;
+  using Run = typename InteractionRuns<Model>::Run;
+
+  /// Recordings with dictionaries.
+  void compare(const std::vector<Interaction<Model>>& of, ComparedRecordings& known) {
+    known.recorded.clear();
+    known.evidence.clear();
+    std::vector<std::vector<EffectEvidence>> draws;
+    for (std::size_t k = 0; k < of.size(); ++k) {  // dictionaries are not moved from here on
+      known.recorded.emplace_back(of[k].recording, known.dictionary[k], settings_.evidence,
+                                  teachers(of[k], known.dictionary[k]));
+      known.evidence.push_back(known.recorded[k].of_recording());
+      draws.emplace_back();
+      for (std::size_t draw = 0; draw < known.recorded[k].draws(); ++draw) {
+        draws.back().push_back(known.recorded[k].of_draw(draw));
+      }
+    }
+    known.chance = chance_level(draws, settings_.judgement);
+    const Discrepancy most = discrepancy(known);
+    const double factor = settings_.reference_factor;
+    known.chance.largest_distance =
+        std::max(known.chance.largest_distance, factor * most.distance * known.chance.distance);
+    known.chance.fall = std::max(known.chance.fall, factor * most.fall);
+    known.chance.overlap = std::max(known.chance.overlap, factor * most.overlap);
+    known.chance.blurred = std::max(known.chance.blurred, factor * most.blurred);
+  }
+
+  /// How far references are from the model, over how far its draws are, and how much of it effects seem to explain,
+  /// though none is there; the most of all. Nothing without references.
+  struct Discrepancy {
+    double distance = 0, fall = 0;
+    double overlap = 0, blurred = 0;  ///< see ChanceLevel
+
+    void include(const EffectEvidence& reference, const ChanceLevel& chance) {
+      distance = std::max(distance, reference.distance / std::max(chance.distance, 1e-12));
+      for (const auto& profile : reference.profile) {
+        if (profile) {
+          fall = std::max(fall, relative_fall(reference.distance, reference.distance - profile->improvement()));
+        }
+      }
+      const auto share = [](const GapGain& gap) { return detail::largest(gap.by) / std::max(gap.without, 1e-12); };
+      overlap = std::max(overlap, share(reference.overlap));
+      blurred = std::max(blurred, share(reference.blurred));
+    }
+  };
+
+  /// References that look like a recording, if there are enough of them. Asked first with a dictionary to which nothing
+  /// was added.
+  std::vector<ReferenceRecording> teachers(const Interaction<Model>& of, const EffectDictionary& dictionary) {
+    std::vector<ReferenceRecording> all;
+    for (std::size_t k = 0; k < reference_dictionaries_.size(); ++k) {
+      all.push_back({references_[k].recording, &reference_dictionaries_[k]});
+    }
+    const auto [known, is_new] = teachers_.try_emplace(of.name);
+    if (is_new && !all.empty()) {
+      const RecordedEvidence alone(of.recording, dictionary, settings_.evidence);
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        if (alone.unlikeness(all[k]) <= settings_.most_unlike) {
+          known->second.push_back(k);
+        }
+      }
+      if (known->second.size() < static_cast<std::size_t>(settings_.least_references)) {
+        known->second.clear();
+      }
+    }
+    std::vector<ReferenceRecording> chosen;
+    for (const std::size_t k : known->second) {
+      chosen.push_back(all[k]);
+    }
+    return chosen;
+  }
+
+  /// Of references that look like the recordings with what the others of them teach; of any references where there are
+  /// none.
+  Discrepancy discrepancy(const ComparedRecordings& known) {
+    Discrepancy most;
+    const bool taught = std::all_of(known.recorded.begin(), known.recorded.end(),
+                                    [](const RecordedEvidence& each) { return each.references() > 0; });
+    if (!taught) {
+      return known.effects.empty() ? unlike_ : unlike_by_effects();
+    }
+    for (const RecordedEvidence& each : known.recorded) {
+      for (std::size_t k = 0; k < each.references(); ++k) {
+        most.include(each.of_reference(k), known.chance);
+      }
+    }
+    return most;
+  }
+
+  /// With runs of all effects, which cost as much as those of a recording that is learnt from.
+  const Discrepancy& unlike_by_effects() {
+    if (!unlike_by_effects_) {
+      unlike_by_effects_.emplace();  // references are judged without any, as in consult_references
+      Discrepancy most;
+      for (const Interaction<Model>& each : references_) {
+        const ComparedRecordings known = (*this)({each}, each.model->effects(), settings_.dictionary);
+        most.include(known.evidence.front(), known.chance);
+      }
+      unlike_by_effects_ = most;
+    }
+    return *unlike_by_effects_;
+  }
+
+  InteractionRuns<Model>* runs_;
+  MissingEffectSettings settings_;
+  std::vector<Interaction<Model>> references_;
+  std::vector<EffectDictionary> reference_dictionaries_{};      ///< by reference: baselines and draws
+  std::map<std::string, std::vector<std::size_t>> teachers_{};  ///< by recording: references that look like it
+  Discrepancy unlike_{};                                        ///< of references without others' help, no effects
+  std::optional<Discrepancy> unlike_by_effects_{};              ///< with effects, once it was asked for
+};
+
+}  // namespace decant::inline DECANT_TARGET

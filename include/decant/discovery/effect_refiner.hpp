@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// The effects that explain most, looked at more closely: strengths, places and times by runs of their own, one step
+/// after another.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/target.hpp>
+#include <decant/discovery/compared_recordings.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_evidence.hpp>
+#include <decant/discovery/effect_judgement.hpp>
+#include <decant/discovery/effect_refinement.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/interaction_runs.hpp>
+#include <decant/discovery/missing_effect_result.hpp>
+#include <decant/discovery/missing_effect_settings.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// Effects together, refined.
+struct RefinedTogether {
+  std::vector<RefinedEffect> effects{};  ///< the new one last
+  double distance = 0, share = 0;        ///< see RefinedEffect
+};
+
+/// Refines the best effects of a judgement.
+template <ForwardModel Model>
+class EffectRefiner {
+ public:
+  /// @param runs, of have to outlive it; all of the interactions have the effect at one strength.
+  EffectRefiner(InteractionRuns<Model>& runs, const MissingEffectSettings& settings,
+                const std::vector<Interaction<Model>>& of)
+      : runs_(&runs), settings_(settings), of_(&of) {}
+
+  /// The best of different answers, each refined together with what was found before; the best first.
+  /// @param before the distance to the model without any.
+  std::vector<RefinedTogether> best(const Judgement& judgement, const ComparedRecordings& known,
+                                    const std::vector<RefinedEffect>& found, double before) {
+    std::vector<Candidate> candidates;
+    std::map<std::string, int> instances;
+    for (const EffectStanding& standing : judgement.standings) {
+      const Effect& effect = known.effects[standing.effect];
+      const std::size_t number = known.number[standing.effect];
+      const bool is_found =
+          std::any_of(found.begin(), found.end(), [&](const RefinedEffect& other) { return other.effect == number; });
+      // of one family the best one, and of an effect in several places two of them
+      const int most = effect.place ? 2 : 1;
+      if (candidates.size() < static_cast<std::size_t>(settings_.refined) && !is_found && standing.improvement > 0 &&
+          instances[effect.answer()] < most) {
+        ++instances[effect.answer()];
+        candidates.emplace_back().judged = standing.effect;
+        EffectPoint& point = candidates.back().point;
+        for (const RefinedEffect& each : found) {
+          point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
+        }
+        point.add(effect, number, {number, standing.strength, {}});
+      }
+    }
+    for (int round = 0; round < settings_.refinement_rounds && !candidates.empty(); ++round) {
+      step_all(candidates, known, static_cast<std::uint32_t>(5001 + 1000 * round));
+      if (round + 1 < settings_.refinement_rounds) {
+        keep_promising(candidates, known.chance);
+      }
+    }
+    std::vector<EffectPoint> points;
+    for (const Candidate& each : candidates) {
+      points.push_back(each.point);
+    }
+    const std::vector<double> distance = distances(points, known);
+    const auto nearest =
+        static_cast<std::size_t>(std::min_element(distance.begin(), distance.end()) - distance.begin());
+    std::vector<RefinedTogether> refined;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (!std::isfinite(distance[k])) {
+        continue;
+      }
+      RefinedTogether one;
+      one.distance = distance[k];
+      one.share = (before - one.distance) / std::max(before - known.chance.distance, 1e-12);
+      const Eigen::VectorXd deviation =
+          k == nearest ? deviations(points[k], candidates[k].views, known)
+                       : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
+      for (std::size_t part = 0; part < points[k].effects(); ++part) {
+        const AppliedEffect applied = points[k].applied(part);
+        const auto [begin, count] = points[k].strength_of(part);
+        const std::size_t judged = part < found.size() ? found[part].judged : candidates[k].judged;
+        one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
+                               applied.window, one.distance, one.share});
+      }
+      refined.push_back(std::move(one));
+    }
+    std::stable_sort(refined.begin(), refined.end(),
+                     [](const auto& a, const auto& b) { return a.distance < b.distance; });
+    return refined;
+  }
+
+ private:
+  using Series = typename InteractionRuns<Model>::Series;
+  using Run = typename InteractionRuns<Model>::Run;
+  using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
+
+  std::size_t middle_seeds() const noexcept { return static_cast<std::size_t>(settings_.refinement_seeds); }
+  /// Of runs to each side of a number. Places and times have many numbers, each of which is off by a lot there.
+  std::size_t slope_seeds(const EffectPoint& point) const noexcept {
+    return point.size() <= 2 ? middle_seeds() : (middle_seeds() + 1) / 2;
+  }
+
+  /// An effect on its way to where it explains most.
+  struct Candidate {
+    std::size_t judged = 0;  ///< its number in the Judgement
+    EffectPoint point{};
+    Views views{};         ///< of the last step
+    double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
+    bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
+  };
+
+  /// Leaves the best one, the next best one as its rival, and all others that may come near it.
+  static void keep_promising(std::vector<Candidate>& candidates, const ChanceLevel& chance) {
+    std::vector<double> sorted;
+    for (const Candidate& each : candidates) {
+      sorted.push_back(each.expected);
+    }
+    std::sort(sorted.begin(), sorted.end());
+    const double rival = sorted[std::min<std::size_t>(1, sorted.size() - 1)];
+    std::erase_if(candidates, [&](const Candidate& each) {
+      return each.expected > rival && relative_fall(each.expected, sorted.front()) >= 3 * chance.fall;
+    });
+  }
+
+  /// One step for each of the candidates that is not settled, all runs side by side. A point at which runs fail stays.
+  void step_all(std::vector<Candidate>& candidates, const ComparedRecordings& known, std::uint32_t seed) {
+    std::vector<Run> runs;
+    const auto ask = [&](const Interaction<Model>& of, const EffectPoint& point, std::size_t seeds) {
+      for (std::size_t k = 0; k < seeds; ++k) {
+        runs.emplace_back(&of, point.run(seed + static_cast<std::uint32_t>(runs.size())));
+      }
+    };
+    for (const Candidate& each : candidates) {
+      if (each.settled) {
+        continue;
+      }
+      const EffectPoint& point = each.point;
+      for (const Interaction<Model>& of : *of_) {
+        ask(of, point, middle_seeds());
+        for (Eigen::Index k = 0; k < point.size(); ++k) {
+          ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
+          ask(of, point.with(k, point.value()[k] + point.step(k)), slope_seeds(point));
+        }
+      }
+    }
+    const std::vector<Series> seen = (*runs_)(runs);
+    const Series* next = seen.data();
+    for (Candidate& each : candidates) {
+      if (each.settled) {
+        continue;
+      }
+      each.views.clear();
+      for (const RecordedEvidence& recorded : known.recorded) {
+        if (auto view = view_of(each.point, recorded, next)) {
+          each.views.push_back(std::move(*view));
+        }
+        next += middle_seeds() + slope_seeds(each.point) * static_cast<std::size_t>(2 * each.point.size());
+      }
+      if (each.views.size() < known.recorded.size()) {
+        each.views.clear();
+        each.expected = std::numeric_limits<double>::infinity();
+        each.settled = true;
+      } else {
+        step(each, known);
+      }
+    }
+  }
+
+  /// By its views.
+  void step(Candidate& candidate, const ComparedRecordings& known) const {
+    std::vector<Eigen::VectorXd> recorded;
+    for (const RecordedEvidence& each : known.recorded) {
+      recorded.push_back(each.recorded_features());
+    }
+    const Eigen::VectorXd move = refinement(candidate.point, candidate.views, recorded);
+    double before = 0;
+    candidate.expected = 0;
+    for (std::size_t k = 0; k < candidate.views.size(); ++k) {
+      const RefinementView& view = candidate.views[k];
+      const auto share = [&](const Eigen::VectorXd& off) {
+        return view.space->distance(view.space->standardised_difference(off)) /
+               static_cast<double>(candidate.views.size());
+      };
+      before += share(recorded[k] - view.middle);
+      candidate.expected += share(recorded[k] - view.middle - view.slope * move);
+    }
+    candidate.settled = relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
+    const Eigen::VectorXd value = candidate.point.value() + move;
+    for (Eigen::Index k = 0; k < candidate.point.size(); ++k) {
+      candidate.point = candidate.point.with(k, value[k]);
+    }
+  }
+
+  /// @param seen of runs at the point, then below and above of each of its numbers.
+  std::optional<RefinementView> view_of(const EffectPoint& point, const RecordedEvidence& recorded,
+                                        const Series* seen) const {
+    const std::size_t seeds = slope_seeds(point);
+    const auto middle = recorded.mean_features({seen, middle_seeds()});
+    seen += middle_seeds();
+    if (!middle) {
+      return std::nullopt;
+    }
+    RefinementView view{&recorded.space(), *middle, Eigen::MatrixXd(middle->size(), point.size())};
+    for (Eigen::Index k = 0; k < point.size(); ++k) {
+      const auto below = recorded.mean_features({seen, seeds});
+      seen += seeds;
+      const auto above = recorded.mean_features({seen, seeds});
+      seen += seeds;
+      const double apart = point.with(k, point.value()[k] + point.step(k)).value()[k] -
+                           point.with(k, point.value()[k] - point.step(k)).value()[k];
+      if (!below || !above || !(apart > 0)) {
+        return std::nullopt;
+      }
+      view.slope.col(k) = (*above - *below) / apart;
+    }
+    return view;
+  }
+
+  /// Standard deviation of each number of a point: what would be found in recordings of it in which all that is
+  /// tolerated is drawn (a parametric bootstrap: Efron and Tibshirani, An Introduction to the Bootstrap, 1993).
+  Eigen::VectorXd deviations(const EffectPoint& point, const Views& views, const ComparedRecordings& known) {
+    Eigen::VectorXd square = Eigen::VectorXd::Zero(point.size());
+    std::vector<Run> runs;
+    for (int draw = 0; draw < settings_.repeats; ++draw) {
+      for (const Interaction<Model>& of : *of_) {
+        runs.emplace_back(&of, point.run(7001 + static_cast<std::uint32_t>(runs.size())));
+        runs.back().second.tolerated = true;
+      }
+    }
+    const std::vector<Series> seen = (*runs_)(runs);
+    std::vector<Eigen::VectorXd> moves;
+    for (const Series* next = seen.data(); !views.empty() && next < seen.data() + seen.size(); next += of_->size()) {
+      std::vector<Eigen::VectorXd> features;
+      for (std::size_t k = 0; k < of_->size(); ++k) {
+        if (const auto one = known.recorded[k].mean_features({next + k, 1})) {
+          features.push_back(*one);
+        }
+      }
+      if (features.size() == of_->size()) {
+        moves.push_back(refinement(point, views, features));
+      }
+    }
+    if (moves.size() < 3) {
+      return Eigen::VectorXd::Constant(point.size(), std::numeric_limits<double>::quiet_NaN());
+    }
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(point.size());
+    for (const Eigen::VectorXd& move : moves) {
+      mean += move / static_cast<double>(moves.size());
+    }
+    for (const Eigen::VectorXd& move : moves) {
+      square += (move - mean).cwiseAbs2() / static_cast<double>(moves.size() - 1);
+    }
+    return square.cwiseSqrt();
+  }
+
+  /// What is left of the learnt recordings at each point, by runs of their own seeds; infinite where runs fail.
+  std::vector<double> distances(const std::vector<EffectPoint>& points, const ComparedRecordings& known) {
+    const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
+    std::vector<Run> runs;
+    for (const EffectPoint& point : points) {
+      for (const Interaction<Model>& of : *of_) {
+        for (std::size_t k = 0; k < seeds; ++k) {
+          runs.emplace_back(&of, point.run(9001 + static_cast<std::uint32_t>(runs.size())));
+        }
+      }
+    }
+    return distances_left(*runs_, runs, seeds, known.recorded);
+  }
+
+  InteractionRuns<Model>* runs_;
+  MissingEffectSettings settings_;
+  const std::vector<Interaction<Model>>* of_;
+};
+
+}  // namespace decant::inline DECANT_TARGET

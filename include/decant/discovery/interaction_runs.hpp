@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Recordings with the models that predict them, and runs of these on an executor.
+
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/silhouette_series.hpp>
+#include <decant/hypothesis/executor.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// A recording and the model that predicts it.
+template <ForwardModel Model>
+struct Interaction {
+  std::string name{};
+  const Model* model = nullptr;               ///< has to outlive the workflow
+  std::vector<SilhouetteSeries> recording{};  ///< by camera
+  std::string
+      of_model{};  ///< all that the model's predictions depend on, for RunJobs' keys; the name where it is empty
+};
+
+/// Runs jobs: work(k) for each key, results in the order of the keys. A key says all that a result depends on beside
+/// the model, so that a journal can look results up.
+using RunJobs = std::function<std::vector<JobResult>(const std::vector<std::string>& keys,
+                                                     const std::function<JobResult(std::size_t)>& work)>;
+
+/// @param executor has to outlive what is returned.
+template <Executor ExecutorType, class Done = decltype(tell_nobody)>
+RunJobs run_jobs_on(ExecutorType& executor, Done done = tell_nobody) {
+  return [&executor, done](const std::vector<std::string>& keys, const std::function<JobResult(std::size_t)>& work) {
+    return executor.run(keys.size(), work, done);
+  };
+}
+
+/// Runs models side by side, as numbers that a journal can keep.
+template <ForwardModel Model>
+class InteractionRuns {
+ public:
+  using Series = std::vector<SilhouetteSeries>;  ///< by camera
+  using Run = std::pair<const Interaction<Model>*, ModelRun>;
+
+  explicit InteractionRuns(RunJobs run_jobs) : run_jobs_(std::move(run_jobs)) {}
+
+  /// Runs of several interactions, in their order; those that failed are empty.
+  std::vector<Series> operator()(const std::vector<Run>& runs) {
+    std::vector<std::string> keys;
+    std::vector<std::size_t> job_of, first;  // equal runs are made once
+    std::map<std::string, std::size_t> number;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      const Interaction<Model>& of = *runs[k].first;
+      std::string key = of.of_model.empty() ? of.name : of.of_model;
+      key += ": " + run_key(of.model->effects(), runs[k].second);
+      const auto [place, is_new] = number.try_emplace(key, keys.size());
+      if (is_new) {
+        keys.push_back(std::move(key));
+        first.push_back(k);
+      }
+      job_of.push_back(place->second);
+    }
+    const std::vector<JobResult> results = run_jobs_(keys, [&](std::size_t job) {
+      const auto& [interaction, run] = runs[first[job]];
+      JobResult numbers;
+      for (const SilhouetteSeries& series : interaction->model->predict(run)) {
+        const std::vector<double> own = series.numbers();
+        numbers.push_back(static_cast<double>(own.size()));
+        numbers.insert(numbers.end(), own.begin(), own.end());
+      }
+      return numbers;
+    });
+    made_ += keys.size();
+    std::vector<Series> seen;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      seen.push_back(series_of(results.at(job_of[k]), runs[k].first->recording));
+    }
+    return seen;
+  }
+
+  std::size_t made() const noexcept { return made_; }  ///< of different runs, in all calls together
+
+ private:
+  static Series series_of(const JobResult& numbers, const Series& recording) {
+    Series seen;
+    std::size_t begin = 0;
+    for (const SilhouetteSeries& camera : recording) {
+      if (begin >= numbers.size()) {
+        return {};
+      }
+      const auto count = static_cast<std::size_t>(numbers[begin]);
+      expects(begin + 1 + count <= numbers.size(), "InteractionRuns: numbers of a run", "as many as they say",
+              numbers.size());
+      seen.push_back(camera.with_numbers(std::span(numbers).subspan(begin + 1, count)));
+      begin += 1 + count;
+    }
+    return seen;
+  }
+
+  RunJobs run_jobs_;
+  std::size_t made_ = 0;
+};
+
+}  // namespace decant::inline DECANT_TARGET

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// What the workflow that finds what a model lacks comes to.
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <decant/core/target.hpp>
+#include <decant/core/types.hpp>
+#include <decant/discovery/disagreement.hpp>
+#include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_judgement.hpp>
+#include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/smallest_seen.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// An effect with what is known of it after refinement.
+struct RefinedEffect {
+  std::size_t effect = 0;  ///< its number among the model's
+  std::size_t judged = 0;  ///< and in MissingEffect::judged
+  Eigen::VectorXd strength{};
+  Eigen::VectorXd deviation{};             ///< standard deviation, by component
+  std::optional<Vector3<double>> place{};  ///< [m], where it was looked for
+  std::optional<TimeWindow> window{};      ///< likewise
+  double distance = 0;                     ///< that is left of the recordings it was found in
+  double share = 0;                        ///< of what is reducible
+
+  AppliedEffect applied() const { return {effect, strength, place, window}; }
+  /// Strengths that hold the truth with 90 %, by component.
+  std::pair<double, double> interval_90(std::size_t component) const {
+    const auto k = static_cast<Eigen::Index>(component);
+    return {strength[k] - 1.645 * deviation[k], strength[k] + 1.645 * deviation[k]};
+  }
+};
+
+/// Whether an effect that was found also explains recordings that were not used.
+enum class Confirmation {
+  Untested,     ///< there were no such recordings, or nothing was found
+  NotTestable,  ///< they show no gap
+  Confirmed,    ///< their gap shrinks by more than chance, and by more than with any rival
+  Refuted       ///< it does not
+};
+
+/// How a gap changed, in the workflow's own distance: about 1 to 1.5 where nothing is missing, see NuisanceSpace.
+struct GapChange {
+  double before = std::numeric_limits<double>::quiet_NaN();
+  double after = std::numeric_limits<double>::quiet_NaN();
+  double noise = std::numeric_limits<double>::quiet_NaN();       ///< where nothing is missing, in the mean
+  double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
+  double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
+
+  /// Of what is reducible.
+  double share() const noexcept { return (before - after) / std::max(before - noise, 1e-12); }
+};
+
+/// What was found.
+struct MissingEffect {
+  Verdict verdict = Verdict::Nothing;
+  std::vector<RefinedEffect> found{};    ///< one after another; of OneOf the best of the first ones
+  std::vector<RefinedEffect> refined{};  ///< all that were looked at closely in the first round, the best first
+  std::vector<std::size_t> one_of{};     ///< of OneOf: numbers of effects that are not told apart
+  Judgement judgement{};                 ///< of the first round, before refinement
+  std::vector<Effect> judged{};          ///< what its numbers are of: the models' effects, and then those of them that
+                                         ///< were also tried where recordings begin to disagree
+  std::vector<std::vector<Disagreement>> where{};  ///< by recording, before anything was added
+  std::vector<SmallestSeen> smallest_seen{};       ///< of each effect that is judged
+  GapChange learn{}, held_out{};
+  Confirmation confirmation = Confirmation::Untested;
+  std::size_t taught_by = 0;  ///< references that look like each of the recordings: these are compared without what
+                              ///< reality does differently all the same
+  std::size_t runs = 0;       ///< of models
+};
+
+}  // namespace decant::inline DECANT_TARGET

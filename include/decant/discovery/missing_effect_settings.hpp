@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+/// Settings of the workflow that finds what a model lacks.
+
+#include <decant/core/expects.hpp>
+#include <decant/core/target.hpp>
+#include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/effect_evidence.hpp>
+#include <decant/discovery/effect_judgement.hpp>
+
+namespace decant::inline DECANT_TARGET {
+
+/// Settings of MissingEffectSearch.
+struct MissingEffectSettings {
+  DictionarySettings dictionary{};
+  DictionarySettings next_dictionary{4, 16, {0.5}};  ///< after an effect was added, and something is still missing
+  RecordedEvidenceSettings evidence{};
+  JudgementSettings judgement{};
+  int refined = 3;                     ///< so many of the best are looked at more closely, >= 1
+  int refinement_rounds = 3;           ///< steps for each, >= 1
+  int repeats = 8;                     ///< of the best one, to see how far estimates scatter, >= 3
+  int refinement_seeds = 2;            ///< runs at each point, >= 1
+  double least_share = 0.8;            ///< of what is reducible effects have to explain in the end, 0 .. 1
+  double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
+  double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
+                                       ///< what is left may be how the model has them
+  int most_effects = 3;                ///< that are added one after another, >= 1
+  double reference_factor = 1.1;       ///< on what references do, >= 1: beyond it something is missing
+  double most_unlike = 0.5;            ///< references that look more unlike a recording teach nothing about how its
+                                       ///< features are off, >= 0; see RecordedEvidence::unlikeness
+  int least_references = 2;            ///< that have to look like a recording for them to teach that, >= 2
+  double threshold = 4;                ///< of find_disagreements
+};
+
+}  // namespace decant::inline DECANT_TARGET
