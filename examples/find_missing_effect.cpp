@@ -50,8 +50,10 @@ int main(int count, char** values) {
   CLI::App app("Finds which effect a simulation lacks, how strong it is, and whether other recordings agree.");
   app.add_option("--learn", learn_folders, "folders of recordings that have it, format version 1")->required();
   app.add_option("--held-out", held_out_folders, "folders of other recordings that have it, to check on");
-  app.add_option("--reference", reference_folders,
-                 "folders of recordings, of any pours, in which nothing is missing: how far reality is from the model");
+  app.add_option(
+      "--reference", reference_folders,
+      "folders of recordings, of any pours, in which nothing is missing: how far reality is from the model; two or "
+      "more that went like those to learn from tell best");
   app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
   app.add_option("--json", json_file, "writes what was found");
   app.add_option("--report", report_file, "writes a page with a film, charts and tables, for a browser");
@@ -121,7 +123,8 @@ int main(int count, char** values) {
                    .find();
     }
     progress.finish();
-    std::printf("%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
+    std::printf("%s\n%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
+                example::references_sentence(reference_folders.size(), result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
                 example::candidates_table(result.judged, result).text().c_str());
     if (result.verdict == decant::Verdict::Nothing) {
@@ -142,7 +145,8 @@ int main(int count, char** values) {
           interactions.push_back(each.get());
         }
         interactions.resize(learn_folders.size() + held_out_folders.size());
-        example::write_missing_effect_report(report_file, interactions, learn_folders.size(), result);
+        example::write_missing_effect_report(report_file, interactions, learn_folders.size(), result,
+                                             reference_folders.size());
       }
     });
     return 0;

@@ -165,6 +165,20 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   return text + " % of what is reducible.";
 }
 
+/// What the answer owes to references.
+inline std::string references_sentence(std::size_t references, const decant::MissingEffect& result) {
+  if (references == 0) {
+    return "There are no references: how far reality is from the model where nothing is missing is not known, and taken "
+           "to be little more than how far its own runs are from each other.";
+  }
+  const std::string count = std::to_string(references) + (references == 1 ? " reference" : " references");
+  return result.taught_by > 0
+             ? std::to_string(result.taught_by) + " of " + count +
+                   " look like the recordings: what they are off from the model by was taken off first."
+             : count + ": how far they are from the model is no gap. None looks enough like the recordings to take off "
+                       "what it is off by.";
+}
+
 /// @param gravity of the recordings [m/s^2].
 inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& effects,
                                           const decant::MissingEffect& result, const decant::Vector3<double>& gravity) {
@@ -238,6 +252,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                       : result.confirmation == Confirmation::Refuted     ? nlohmann::json(false)
                       : result.confirmation == Confirmation::NotTestable ? nlohmann::json("not_testable")
                                                                          : nlohmann::json();
+  json["taught_by"] = result.taught_by;
   json["runs"] = result.runs;
   return json;
 }

@@ -158,10 +158,11 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
 }  // namespace detail
 
 /// @param interactions those that were learnt from, the first one's films are shown, then those held out.
-/// @param learnt how many of them were learnt from.
+/// @param learnt how many of them were learnt from. @param references how many recordings there were in which nothing
+/// is missing.
 inline void write_missing_effect_report(const std::string& file,
                                         const std::vector<const RecordedInteraction*>& interactions, std::size_t learnt,
-                                        const decant::MissingEffect& result) {
+                                        const decant::MissingEffect& result, std::size_t references) {
   const std::vector<decant::Effect>& effects = result.judged;
   std::vector<detail::ComparedModel> models = detail::compared_models(effects, result);
   for (detail::ComparedModel& model : models) {
@@ -205,6 +206,7 @@ inline void write_missing_effect_report(const std::string& file,
   report.heading("Candidates");
   report.table(candidates_table(effects, result));
   report.heading("What is tolerated");
+  report.paragraph(references_sentence(references, result));
   report.table(tolerated_table(effects));
   report.heading("What would have been seen");
   report.paragraph(
