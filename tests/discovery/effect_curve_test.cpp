@@ -80,6 +80,35 @@ TEST_CASE("effect curve: finds the strength by which features changed, from othe
   }
 }
 
+TEST_CASE("effect curve: what chaos makes of weak effects is held back, and strong ones are as they were simulated") {
+  const NuisanceSpace space = plain_space();
+  Features draw(9);
+  const VectorXd way = draw.noise(1, 0.3), bend = draw.noise(1, 0.3);
+  const double chaos = space.distance(space.standardised_difference(draw.noise(1, 0.3)));  // of a single run
+  const std::vector<double> strengths{0.35, 1};
+  // how far the curve is from what the effect does at a strength, by distance
+  const auto off = [&](double size, double at, double told) {
+    double sum = 0;
+    for (int repeat = 0; repeat < 10; ++repeat) {
+      MatrixXd differences(curve_features, 2);
+      for (Index k = 0; k < 2; ++k) {
+        const double s = strengths[static_cast<std::size_t>(k)];
+        differences.col(k) = size * (s * way + s * s * bend) + draw.noise(1, 0.3);
+      }
+      std::vector<EffectCurve::Strength> each{one(0.35), one(1)};
+      const EffectCurve curve(space, {{0, false}}, each, differences, told);
+      sum += space.distance(curve.at(one(at)) - space.standardised_difference(size * (at * way + at * at * bend)));
+    }
+    return sum / 10;
+  };
+  // a curve through both runs has all of the weak one's chaos there; a straight line has a third of the strong one's
+  CHECK(off(0.5, 0.35, 0) == Approx(chaos).epsilon(0.2));
+  CHECK(off(0.5, 0.35, chaos) < 0.3 * chaos);
+  // what is bent by much more than chaos stays bent
+  CHECK(off(20, 0.35, chaos) < 1.2 * chaos);
+  CHECK(off(20, 1, chaos) < 1.2 * chaos);
+}
+
 TEST_CASE("effect curve: strengths to both sides of what the model has, and one alone") {
   const NuisanceSpace space = plain_space();
   Features draw(2);

@@ -28,8 +28,12 @@ struct StrengthBase {
 };
 
 /// A curve through standardised features, fitted to simulations with the effect less the baseline by least squares.
-/// Two coefficients per feature and component smooth what is chaotic in single simulations; components add up. Beyond
-/// the simulated strengths it says nothing.
+/// Two coefficients per feature and component smooth what is chaotic in single simulations; components add up. The
+/// second one, by which the effect is not in proportion to the law's first term, is held back as far as chaos drowns
+/// it: c minimises sum |d - c1 p1 - c2 p2|^2 + l |c2|^2, where l is the variance of chaos over what the second
+/// coefficient is expected to be, which is as large as the effect is at its largest strength (ridge regression: Hoerl
+/// and Kennard, Technometrics 12, 1970). So weak effects are straight lines and strong ones as they were simulated.
+/// Beyond the simulated strengths it says nothing.
 class EffectCurve {
  public:
   using Strength = StrengthProfile::Strength;
@@ -37,10 +41,11 @@ class EffectCurve {
   /// @param space has to outlive it.
   /// @param components one to three. @param strengths of each simulation, by component; each component has one or more
   /// other than its base, and several simulations may have the same (other seeds).
-  /// @param differences p x as many: features less the space's center.
-  /// Throws std::invalid_argument if numbers do not fit or are not finite.
+  /// @param differences p x as many: features less the space's center. @param chaos distance of a single simulation
+  /// from the mean of many, >= 0; 0 goes through all simulations as closely as two coefficients can. Throws
+  /// std::invalid_argument if numbers do not fit or are not finite.
   EffectCurve(const NuisanceSpace& space, const std::vector<StrengthBase>& components,
-              const std::vector<Strength>& strengths, const Eigen::MatrixXd& differences)
+              const std::vector<Strength>& strengths, const Eigen::MatrixXd& differences, double chaos = 0)
       : space_(&space), axes_(components.size()) {
     expects(differences.rows() == space.features(), "EffectCurve: features", "as many as of the space",
             differences.rows());
@@ -63,11 +68,18 @@ class EffectCurve {
       standardised.col(k) = space.standardised_difference(differences.col(k));
     }
     const Eigen::MatrixXd normal = at * at.transpose();
-    const Eigen::MatrixXd solved = normal.ldlt().solve(at * standardised.transpose()).transpose();
+    Eigen::MatrixXd held_back = normal;
+    for (std::size_t k = 0; k < used.size(); ++k) {
+      if (used[k] % 2 == 1 && chaos > 0) {
+        const double size = largest_effect(static_cast<std::size_t>(used[k] / 2), strengths, standardised) - chaos;
+        held_back(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) += chaos / std::max(size, 0.05 * chaos);
+      }
+    }
+    const Eigen::MatrixXd solved = held_back.ldlt().solve(at * standardised.transpose()).transpose();
     const auto count = static_cast<Eigen::Index>(2 * components.size());
     uncertainty_.setZero(count, count);
-    const Eigen::MatrixXd inverse = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
-    uncertainty_(used, used) = inverse;
+    const Eigen::MatrixXd inverse = held_back.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
+    uncertainty_(used, used) = inverse * normal * inverse;
     coefficient_.setZero(differences.rows(), count);
     for (std::size_t k = 0; k < used.size(); ++k) {
       coefficient_.col(used[k]) = solved.col(static_cast<Eigen::Index>(k));
@@ -122,6 +134,20 @@ class EffectCurve {
     expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", of.base);
     axes_[component] = {{of.base, std::max(range.second - of.base, of.base - range.first), of.saturating}, range};
     return distinct.size();
+  }
+
+  /// The mean distance of simulations at a component's largest strength.
+  double largest_effect(std::size_t component, const std::vector<Strength>& strengths,
+                        const Eigen::MatrixXd& standardised) const {
+    const StrengthLaw& law = axes_[component].law;
+    double sum = 0, count = 0;
+    for (std::size_t k = 0; k < strengths.size(); ++k) {
+      if (std::abs(strengths[k][static_cast<Eigen::Index>(component)] - law.base) >= 0.999 * law.scale) {
+        sum += space_->distance(standardised.col(static_cast<Eigen::Index>(k)));
+        count += 1;
+      }
+    }
+    return count > 0 ? sum / count : 0;
   }
 
   const NuisanceSpace* space_;

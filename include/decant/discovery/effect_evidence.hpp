@@ -129,17 +129,10 @@ class RecordedEvidence {
   /// What an effect changes; nothing where nothing is known of it. This has to outlive it.
   std::optional<EffectCurve> curve(std::size_t effect) const {
     const std::vector<std::size_t> runs = telling_runs(effect);
-    return runs.empty() ? std::nullopt : std::optional<EffectCurve>(curve(effect, runs, *space_));
+    return runs.empty() ? std::nullopt : std::optional<EffectCurve>(curve(effect, runs, *space_, chaos()));
   }
   /// Mean distance of a single run of the model as it is from the mean of many; 0 with only one of them.
-  double chaos() const {
-    const Eigen::MatrixXd off = sample_.baseline.colwise() - sample_.baseline.rowwise().mean();
-    double sum = 0;
-    for (Eigen::Index k = 0; k < off.cols(); ++k) {
-      sum += space_->distance(space_->standardised_difference(off.col(k)));
-    }
-    return off.cols() > 1 ? sum / static_cast<double>(off.cols() - 1) : 0;
-  }
+  double chaos() const { return chaos(*space_); }
 
   /// What the recording says.
   EffectEvidence of_recording() const { return evidence(recording_, own_, *space_); }
@@ -235,6 +228,7 @@ class RecordedEvidence {
     const auto blurred = [&](const Series& other) { return blurred_gap(seen, other); };
     result.overlap.without = baseline_gap(overlap);
     result.blurred.without = baseline_gap(blurred);
+    const double chaotic = chaos(space);
     for (std::size_t effect = 0; effect < dictionary_->effects.size(); ++effect) {
       const std::vector<std::size_t> runs = telling_runs(effect);
       result.profile.emplace_back();
@@ -243,14 +237,24 @@ class RecordedEvidence {
       if (runs.empty()) {
         continue;
       }
-      result.profile.back() = curve(effect, runs, space).profile(standardised);
+      result.profile.back() = curve(effect, runs, space, chaotic).profile(standardised);
       result.overlap.by.back() = gain(effect, runs, result.overlap.without, overlap);
       result.blurred.by.back() = gain(effect, runs, result.blurred.without, blurred);
     }
     return result;
   }
 
-  EffectCurve curve(std::size_t effect, const std::vector<std::size_t>& runs, const NuisanceSpace& space) const {
+  double chaos(const NuisanceSpace& space) const {
+    const Eigen::MatrixXd off = sample_.baseline.colwise() - sample_.baseline.rowwise().mean();
+    double sum = 0;
+    for (Eigen::Index k = 0; k < off.cols(); ++k) {
+      sum += space.distance(space.standardised_difference(off.col(k)));
+    }
+    return off.cols() > 1 ? sum / static_cast<double>(off.cols() - 1) : 0;
+  }
+
+  EffectCurve curve(std::size_t effect, const std::vector<std::size_t>& runs, const NuisanceSpace& space,
+                    double chaotic) const {
     std::vector<StrengthBase> components;
     for (const EffectComponent& each : dictionary_->effects[effect].components) {
       components.push_back({each.base, each.saturating});
@@ -261,7 +265,7 @@ class RecordedEvidence {
       strengths.push_back(dictionary_->strength(runs[k]));
       differences.col(static_cast<Eigen::Index>(k)) = of_run_.at(runs[k]) - space.center();
     }
-    return EffectCurve(space, components, strengths, differences);
+    return EffectCurve(space, components, strengths, differences, chaotic);
   }
 
   template <class Gap>

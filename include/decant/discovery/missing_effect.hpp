@@ -172,7 +172,7 @@ class MissingEffectSearch {
     std::vector<std::size_t> result;
     std::set<std::string> answers;
     for (const RefinedEffect& each : refined) {
-      if (relative_fall(each.distance, refined.front().distance) < chance.fall && answers.insert(answer(each)).second) {
+      if (relative_fall(each.distance, refined.front().distance) < settings_.alike_factor * chance.fall && answers.insert(answer(each)).second) {
         result.push_back(each.effect);
       }
     }

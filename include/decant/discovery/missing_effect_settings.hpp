@@ -25,6 +25,8 @@ struct MissingEffectSettings {
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
   double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
                                        ///< what is left may be how the model has them
+  double alike_factor = 2;             ///< on what chance explains, >= 1: what explains less than so much more is no
+                                       ///< better an answer
   int most_effects = 3;                ///< that are added one after another, >= 1
   double reference_factor = 1.1;       ///< on what references do, >= 1: beyond it something is missing
   double most_unlike = 0.5;            ///< references that look more unlike a recording teach nothing about how its

@@ -44,7 +44,7 @@ struct NuisanceSample {
 /// Settings of NuisanceSpace.
 struct NuisanceSettings {
   double floor = 0.1;             ///< least standard deviation of a feature, in its unit, > 0
-  int directions = 5;             ///< in which all features vary together, >= 0; at most a quarter of the draws
+  int directions = 12;            ///< in which all features vary together, >= 0; at most a quarter of the draws
   double template_deviation = 3;  ///< how many times its tolerance an error of measurement may be, >= 0
 };
 
