@@ -119,6 +119,29 @@ TEST_CASE("silhouette features: a square that is wet in one simulation alone cou
   CHECK(features.of({wet.series(10), dry.series(10)})[1] == 0);
 }
 
+TEST_CASE(
+    "silhouette features: which of them another recording of the same frames has seen, and which recordings fit") {
+  const Film own = film(7, 0.5, {4, 5}), other = film(8, 0.5, {0, 3, 4});
+  SilhouetteFeatureSettings settings;
+  settings.window = 2 / 15.0;
+  const std::vector<SilhouetteFeatures::Series> none;
+  const SilhouetteFeatures features({own.series(5)}, none, settings);
+  const std::vector<bool> seen = features.seen_in({other.series(5)});
+  REQUIRE(seen.size() == features.size());
+  // windows of frames 0 and 1, 2 and 3, 6 and 7, 8: of 4 and 5 there is none
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    CHECK(seen[k] == (features.place(k).window > 1));
+  }
+  CHECK(features.fit({other.series(5)}));
+  CHECK(!features.fit({other.series(6)}));
+  CHECK(!features.fit({other.series(5), other.series(5)}));
+  Film longer = other;
+  longer.masks.push_back(other.masks.back());
+  longer.time.push_back(2);
+  longer.seen.push_back(true);
+  CHECK(!features.fit({longer.series(5)}));
+}
+
 TEST_CASE("silhouette series: numbers and back") {
   const SilhouetteSeries series = film(4, 0.4, {3}).series(7), empty = film(5, 0, {3}).series(7);
   CHECK(series.rows() == 6);
