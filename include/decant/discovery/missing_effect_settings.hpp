@@ -21,7 +21,7 @@ struct MissingEffectSettings {
   int refinement_rounds = 3;           ///< steps for each, >= 1
   int repeats = 8;                     ///< of the best one, to see how far estimates scatter, >= 3
   int refinement_seeds = 2;            ///< runs at each point, >= 1
-  double least_share = 0.8;            ///< of what is reducible effects have to explain in the end, 0 .. 1
+  double least_share = 0.7;            ///< of what is reducible effects have to explain in the end, 0 .. 1
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
   double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
                                        ///< what is left may be how the model has them
