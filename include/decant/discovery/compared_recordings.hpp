@@ -38,7 +38,8 @@ struct ComparedRecordings {
 };
 
 /// What is left of recordings with the mean of some runs in place of the model as it is: mean distances, set after set.
-/// Infinite where a run failed.
+/// What few runs' mean is off by through their own chaos is taken off, as that of many is not. Infinite where a run
+/// failed.
 /// @param runs `seeds` of them for each recording in turn, set after set.
 template <ForwardModel Model>
 std::vector<double> distances_left(InteractionRuns<Model>& make,
@@ -52,7 +53,9 @@ std::vector<double> distances_left(InteractionRuns<Model>& make,
       const auto middle = of.mean_features({next, seeds});
       next += seeds;
       if (middle) {
-        sum += of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
+        const double distance =
+            of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
+        sum += std::max(0.0, distance - of.chaos() / static_cast<double>(seeds));
       } else {
         sum = std::numeric_limits<double>::infinity();
       }

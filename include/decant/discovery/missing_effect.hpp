@@ -126,7 +126,7 @@ class MissingEffectSearch {
       result.learn.after = refined.front().distance;
       explained = explains;
       if (round == 0 && explained) {
-        result.one_of = alike(result.refined, known.chance);
+        result.one_of = alike(result.refined, known.chance, result.learn.before);
       }
       if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
           refined.front().share >= settings_.enough_share) {
@@ -167,12 +167,17 @@ class MissingEffectSearch {
     return recorded.standardised().cwiseQuotient(usual);
   }
 
-  /// Those of other families that explain as much as the best one, within chance.
-  std::vector<std::size_t> alike(const std::vector<RefinedEffect>& refined, const ChanceLevel& chance) const {
+  /// Those of other families that explain as much as the best one, within chance, and more than chance alone does.
+  /// @param before the distance to the model without any.
+  std::vector<std::size_t> alike(const std::vector<RefinedEffect>& refined, const ChanceLevel& chance,
+                                 double before) const {
     std::vector<std::size_t> result;
     std::set<std::string> answers;
-    for (const RefinedEffect& each : refined) {
-      if (relative_fall(each.distance, refined.front().distance) < settings_.alike_factor * chance.fall && answers.insert(answer(each)).second) {
+    const double least = settings_.alike_factor * chance.fall;
+    for (const RefinedEffect& each : refined) {  // the best one first
+      const bool near = relative_fall(each.distance, refined.front().distance) < least;
+      const bool explains = answers.empty() || relative_fall(before, each.distance) > chance.fall;
+      if (near && explains && answers.insert(answer(each)).second) {
         result.push_back(each.effect);
       }
     }
