@@ -207,6 +207,29 @@ TEST_CASE("missing effect: references of other interactions say how far reality 
   CHECK(found({0, 0.8, 1, 0, foreign}).verdict != Verdict::Nothing);
 }
 
+TEST_CASE("missing effect: what is left does not depend on how many runs say so") {
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
+  const std::vector<Interaction<JetModel>> of{{"a", &model, film_of({}, 91, 0.9)}};
+  InteractionRuns<JetModel> make(run_jobs_on(executor));
+  RecordingComparison<JetModel> compare(make, {}, {});
+  const ComparedRecordings known = compare(of, {}, {24, 48, {1.0}});
+  std::vector<InteractionRuns<JetModel>::Run> runs;
+  for (std::uint32_t seed = 1; seed <= 24; ++seed) {
+    runs.emplace_back(&of.front(), ModelRun{{}, 300 + seed, false});
+  }
+  const std::vector<double> one_by_one = distances_left(make, runs, 1, known.recorded);
+  const std::vector<double> together = distances_left(make, runs, 24, known.recorded);
+  REQUIRE(one_by_one.size() == 24);
+  REQUIRE(together.size() == 1);
+  double mean = 0;
+  for (const double each : one_by_one) {
+    mean += each / 24;
+  }
+  // single runs are off by their own chaos, too, which two samples of 24 know within a third
+  CHECK(mean == Approx(together.front()).margin(known.recorded.front().chaos() / 3));
+}
+
 TEST_CASE("missing effect: two at once are found one after another") {
   const MissingEffect result = found_in({0, 0.8, 1, 0.05}, 71);
   CHECK(result.verdict == Verdict::Named);
@@ -272,4 +295,7 @@ TEST_CASE("missing effect: what is asked is checked") {
   settings = {};
   settings.enough_share = -1;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("enough_share"));
+  settings = {};
+  settings.alike_factor = 0.5;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("alike_factor"));
 }

@@ -213,15 +213,14 @@ class RecordingComparison {
   /// References that look like a recording, if there are enough of them. Asked first with a dictionary to which nothing
   /// was added.
   std::vector<ReferenceRecording> teachers(const Interaction<Model>& of, const EffectDictionary& dictionary) {
-    std::vector<ReferenceRecording> all;
-    for (std::size_t k = 0; k < reference_dictionaries_.size(); ++k) {
-      all.push_back({references_[k].recording, &reference_dictionaries_[k]});
-    }
+    const auto reference = [&](std::size_t k) {
+      return ReferenceRecording{references_[k].recording, &reference_dictionaries_[k]};
+    };
     const auto [known, is_new] = teachers_.try_emplace(of.name);
-    if (is_new && !all.empty()) {
+    if (is_new && !reference_dictionaries_.empty()) {
       const RecordedEvidence alone(of.recording, dictionary, settings_.evidence);
-      for (std::size_t k = 0; k < all.size(); ++k) {
-        if (alone.unlikeness(all[k]) <= settings_.most_unlike) {
+      for (std::size_t k = 0; k < reference_dictionaries_.size(); ++k) {
+        if (alone.unlikeness(reference(k)) <= settings_.most_unlike) {
           known->second.push_back(k);
         }
       }
@@ -231,7 +230,7 @@ class RecordingComparison {
     }
     std::vector<ReferenceRecording> chosen;
     for (const std::size_t k : known->second) {
-      chosen.push_back(all[k]);
+      chosen.push_back(reference(k));
     }
     return chosen;
   }

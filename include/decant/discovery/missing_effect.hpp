@@ -67,6 +67,7 @@ class MissingEffectSearch {
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
+    expects(settings_.alike_factor >= 1, "MissingEffectSettings: alike_factor", ">= 1", settings_.alike_factor);
     expects(settings_.most_unlike >= 0, "MissingEffectSettings: most_unlike", ">= 0", settings_.most_unlike);
     expects(settings_.least_references >= 2, "MissingEffectSettings: least_references", ">= 2",
             settings_.least_references);

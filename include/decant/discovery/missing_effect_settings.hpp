@@ -3,7 +3,6 @@
 
 /// Settings of the workflow that finds what a model lacks.
 
-#include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/effect_evidence.hpp>
