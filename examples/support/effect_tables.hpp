@@ -108,8 +108,10 @@ struct EffectScore {
     return number_at(*result, "/interval_90/0") <= strength && strength <= number_at(*result, "/interval_90/1");
   }
   bool comparable() const {
-    return verdict() == "named" && result->at("effect").size() == 1 &&
-           result->at("effect").front() == result->at("truth").at("effect") && result->at("strength").is_number();
+    const std::string hidden = result->at("truth").at("effect");
+    return verdict() == "named" && result->at("effect").size() == 1 && result->at("effect").front() == hidden &&
+           hidden != "shear_thinning" &&  // that of the catalogue thins otherwise
+           result->at("strength").is_number();
   }
   double gap(const char* key) const { return number_at(*result, std::string("/gap/") + key); }
   /// Of what is reducible of the gap of the pour that was not used.

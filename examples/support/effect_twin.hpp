@@ -33,6 +33,7 @@
 #include <decant/force/body_acceleration.hpp>
 #include <decant/force/linear_drag.hpp>
 #include <decant/force/quadratic_drag.hpp>
+#include <decant/force/shear_thinning_viscosity.hpp>
 #include <decant/force/suction.hpp>
 #include <decant/force/surface_tension.hpp>
 #include <decant/force/wall_adhesion.hpp>
@@ -77,13 +78,13 @@ struct EffectRecordingSettings {
 };
 
 /// All effects are there, and cost nothing where they are zero.
-// SHEAR_THINNING: replace Viscosity by the force that has both, and set it in EffectReality::set_forces
 template <class PressureSolverType>
 struct EffectRealityParts : RealityParts<PressureSolverType> {
-  using Forces = std::tuple<decant::Gravity<float>, decant::Viscosity<float>, decant::ResidualViscosity<float>,
-                            decant::LinearDrag<float>, decant::QuadraticDrag<float>, decant::BodyAcceleration<float>,
-                            decant::Suction<float>, decant::WallFriction<float>, decant::WallAdhesion<float>,
-                            decant::SurfaceTension<float>, BackPressure, Stirrer, StickyPatch, Puff, ShakingTable>;
+  using Forces =
+      std::tuple<decant::Gravity<float>, decant::ShearThinningViscosity<float>, decant::ResidualViscosity<float>,
+                 decant::LinearDrag<float>, decant::QuadraticDrag<float>, decant::BodyAcceleration<float>,
+                 decant::Suction<float>, decant::WallFriction<float>, decant::WallAdhesion<float>,
+                 decant::SurfaceTension<float>, BackPressure, Stirrer, StickyPatch, Puff, ShakingTable>;
 };
 
 /// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
@@ -212,6 +213,13 @@ class EffectReality {
   void set_lasting_forces() {
     using namespace decant;
     const double layers = spacing_of_strengths / model_.spacing();
+    if (effect_.is("shear_thinning")) {  // other than catalogues have it
+      ShearThinningViscosity<float>& friction = model_.template force<ShearThinningViscosity<float>>();
+      friction.high_shear_viscosity = friction.kinematic_viscosity;
+      friction.kinematic_viscosity += static_cast<float>(effect_.strength);
+      friction.relaxation_time = 0.05F;
+      friction.exponent = 0.45F;
+    }
     model_.template force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
     model_.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
     model_.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));

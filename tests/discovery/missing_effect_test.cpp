@@ -65,6 +65,21 @@ TEST_CASE("missing effect: each is named with its strength, and confirmed where 
   }
 }
 
+TEST_CASE("missing effect: what explains no more than chance is no alternative, however near the best one it counts") {
+  MissingEffectSettings settings;
+  settings.alike_factor = 1e6;  // all that were looked at are near
+  const MissingEffect result = found_in({0, 0, 1, 0.05}, 31, settings);
+  std::size_t by_chance = 0;
+  for (const RefinedEffect& each : result.refined) {
+    const bool alternative = std::count(result.one_of.begin(), result.one_of.end(), each.effect) > 0;
+    const bool explains = relative_fall(result.learn.before, each.distance) > result.learn.by_chance;
+    by_chance += explains ? 0 : 1;
+    CHECK((explains || !alternative));
+  }
+  CHECK(by_chance >= 1);
+  CHECK(!result.one_of.empty());
+}
+
 TEST_CASE("missing effect: what a pour does not tell apart is told as a set") {
   // a weak pull against the jet looks like drag, up to what chance decides
   int sets = 0;

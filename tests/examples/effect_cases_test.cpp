@@ -124,12 +124,17 @@ TEST_CASE("effect cases: each effect comes equally often and in all scenarios, a
       const std::size_t rounds = 20 * scenarios_of(range).size();
       std::map<std::string, std::map<std::size_t, std::size_t>> found;
       std::map<std::string, std::set<bool>> signs;
+      std::size_t thinning = 0;
       for (std::size_t k = 0; k < rounds * entries.size(); ++k) {
         const EffectCase hidden = effect_case(range, kind, static_cast<int>(k));
-        const EffectEntry& entry = entries[k % entries.size()];
+        const bool thins = hidden.effect.is("shear_thinning");
+        const EffectEntry& listed = entries[k % entries.size()];
+        const EffectEntry& entry = thins ? shear_thinning : listed;
         REQUIRE(hidden.effect.name == entry.name);
-        ++found[entry.name][hidden.scenario];
-        signs[entry.name].insert(hidden.effect.strength > 0);
+        CHECK(hidden.effect.family == listed.family);
+        ++found[listed.name][hidden.scenario];
+        thinning += thins ? 1 : 0;
+        signs[listed.name].insert(hidden.effect.strength > 0);
         const bool roll = hidden.effect.variant == "roll";
         const double factor = kind == CaseKind::Weak ? 0.5 : 1;
         const double least = hidden.effect.is("camera_shift") ? (roll ? 0.5 : 2) : entry.least;
@@ -153,6 +158,8 @@ TEST_CASE("effect cases: each effect comes equally often and in all scenarios, a
         const bool either = entry.either_sign || std::string(entry.name) == "camera_shift";
         CHECK(signs[entry.name].size() == (either ? 2U : 1U));
       }
+      const bool physics = kind == CaseKind::Moderate || kind == CaseKind::Weak;
+      CHECK(thinning == (physics ? rounds / 2 : 0));
     }
   }
 }
