@@ -54,7 +54,7 @@ inline const std::vector<EffectEntry>& hidden_effects() {
       {"suction", "suction", "m/s^2", 6, 12},             // at 5 cm
       {"gravity", "gravity", "share", 0.12, 0.14, true},  // added, of 9.81 m/s^2
       {"leak", "leak", "ml/s", 20, 30},                   // out of the container
-      {"loss", "loss", "ml/s", 15, 30},                   // out of the pan
+      {"loss", "loss", "ml/s", 20, 35},                   // soaked up in the pan
       {"inflow", "inflow", "ml/s", 15, 30},
       {"obstacle", "obstacle", "mm", 15, 25},
       {"back_pressure", "back_pressure", "m/s^2", 6, 10},

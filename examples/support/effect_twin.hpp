@@ -16,7 +16,6 @@
 #include <limits>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -46,7 +45,6 @@
 #include <decant/simulation/inlet.hpp>
 #include <decant/simulation/simulator.hpp>
 
-#include "drain.hpp"
 #include "effect_cases.hpp"
 #include "effect_forces.hpp"
 #include "effect_scenarios.hpp"
@@ -132,25 +130,21 @@ class EffectReality {
 
   const Model& model() const { return model_; }
   const ToleratedErrors& errors() const { return errors_; }
-  double initial_volume() const { return initial_volume_; }                ///< [m^3]
-  double removed() const { return drain_ ? drain_->removed() : leaked_; }  ///< by a leak or a loss [m^3]
+  double initial_volume() const { return initial_volume_; }  ///< [m^3]
+  double removed() const { return removed_; }                ///< by a leak or a loss [m^3]
   /// Where the effect is, what it does and when.
   const nlohmann::json& description() const { return description_; }
 
   /// Goes on to a time [s]. Throws std::runtime_error where it cannot.
   decant::StepReport advance(double time) {
-    // short enough for drains to take single particles, and the same for all
-    constexpr double slice = 1.0 / 60;
+    constexpr double slice = 1.0 / 60;  // sub-steps end there
     const double start = model_.time();
     const int slices = std::max(1, static_cast<int>(std::lround((time - start) / slice)));
     decant::StepReport report;
     for (int k = 1; k <= slices; ++k) {
-      const double before = model_.time(), end = k == slices ? time : start + (time - start) * k / slices;
+      const double end = k == slices ? time : start + (time - start) * k / slices;
       report = step_reality(model_, end, end);
-      leaked_ = report.drained;
-      if (drain_) {
-        drain_->drain(model_, model_.time() - before);
-      }
+      removed_ = report.drained;
     }
     // what has left the picture would fall faster and faster, and sub-steps get shorter with it
     model_.remove_particles_if([&](decant::Index i) { return model_.fluid().position(2, i) < lowest_seen; });
@@ -311,9 +305,15 @@ class EffectReality {
       model_.add_outlet(outlet);
       say("container", hole);
     } else if (effect_.is("loss")) {
-      const Vector3<double> hole = scenario_.pan.floor_below(0.02 * effect_.displacement);
-      drain_.emplace(pan_motion_, hole, 1e-6 * effect_.strength);
-      say("pan", hole);
+      // a cloth on the floor, which soaks up what is above it
+      OutletSettings cloth;
+      cloth.body = pan_body_;
+      cloth.position = scenario_.pan.floor_below(0.02 * effect_.displacement);
+      cloth.radius = 0.6 * scenario_.pan.radius;
+      cloth.order = OutletOrder::Evenly;
+      cloth.flow = {{0, 1e-6 * effect_.strength}, {60, 1e-6 * effect_.strength}};
+      model_.add_outlet(cloth);
+      say("pan", cloth.position);
     } else if (effect_.is("inflow")) {
       InletSettings inlet;
       const bool above = effect_.variant == "above the pan";
@@ -387,8 +387,7 @@ class EffectReality {
   Model model_;
   decant::BodyId container_body_ = 0, pan_body_ = 0;
   double initial_volume_ = 0;  ///< [m^3]
-  std::optional<Drain> drain_{};
-  double leaked_ = 0;  ///< [m^3]
+  double removed_ = 0;         ///< [m^3]
   nlohmann::json description_ = nlohmann::json::object();
 };
 

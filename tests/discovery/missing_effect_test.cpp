@@ -263,6 +263,23 @@ TEST_CASE("missing effect: two at once are found one after another") {
   CHECK(result.confirmation == Confirmation::Confirmed);
 }
 
+TEST_CASE("missing effect: the more effects, the less they may leave, and one that helps little is the last") {
+  const Jet gust{0, 0, 1, 0, 4};  // which no effect is, but a pull at another speed looks like it
+  const MissingEffect usual = found_in(gust, 71);
+  CHECK(usual.verdict == Verdict::Unexplained);
+  MissingEffectSettings settings;
+  settings.least_share = 0.5;  // so two may leave a quarter
+  const MissingEffect two = found_in(gust, 71, settings);
+  CHECK(two.verdict == Verdict::Named);
+  REQUIRE(two.found.size() == 2);
+  CHECK(two.found.back().share > MissingEffectSettings{}.least_share);  // enough for one
+
+  settings.promising_factor = 2 * two.refined.front().share + 0.01;  // half of it is asked of one
+  const MissingEffect one = found_in(gust, 71, settings);
+  CHECK(one.verdict == Verdict::Unexplained);
+  CHECK(one.runs < two.runs);
+}
+
 TEST_CASE("missing effect: runs that fail are left out, and no run is made twice") {
   JetModel model(0.9);
   model.broken_above = 0.75;  // half the range: the stronger of both runs fails

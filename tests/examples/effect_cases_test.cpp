@@ -20,7 +20,6 @@
 #include <decant/boundary/cavity.hpp>
 #include <decant/testing/force.hpp>
 
-#include "../../examples/support/drain.hpp"
 #include "../../examples/support/effect_forces.hpp"
 #include "../../examples/support/fattened_mask.hpp"
 #include "catch.hpp"
@@ -52,37 +51,6 @@ struct LoneParticle {
     acceleration.setOnes();  // what is there is added to
     force.accumulate(step, acceleration);
     return acceleration.col(0).cast<double>() - decant::Vector3<double>::Ones();
-  }
-};
-
-/// What a Drain asks of a simulation.
-struct FewParticles {
-  std::vector<decant::Vector3<double>> places;
-  struct {
-    decant::PointArray<float> position;
-    decant::Index size() const { return position.cols(); }
-  } liquid;
-  double now = 0;
-
-  explicit FewParticles(std::size_t count, double first, double apart) {
-    liquid.position.resize(3, static_cast<decant::Index>(count));
-    for (decant::Index i = 0; i < liquid.size(); ++i) {
-      liquid.position.col(i) << static_cast<float>(first + apart * static_cast<double>(i)), 0, 0;
-    }
-  }
-  double spacing() const { return 0.01; }
-  double time() const { return now; }
-  auto& fluid() { return liquid; }
-  template <class Predicate>
-  void remove_particles_if(Predicate&& gone) {
-    decant::PointArray<float> kept(3, 0);
-    for (decant::Index i = 0; i < liquid.size(); ++i) {
-      if (!gone(i)) {
-        kept.conservativeResize(3, kept.cols() + 1);
-        kept.col(kept.cols() - 1) = liquid.position.col(i);
-      }
-    }
-    liquid.position = kept;
   }
 };
 
@@ -315,27 +283,6 @@ TEST_CASE("effect forces: a sticky patch slows liquid along one side of a wall")
   CHECK((felt(0.01, 3) - Eigen::Vector3d((after - 0.3) / 0.001, 0, 0)).norm() < 0.01);
   CHECK(felt(-0.01, 3).norm() == 0);
   CHECK(felt(0.01, 2).norm() == 0);
-}
-
-TEST_CASE("drain: takes the nearest at its flow, and no more later for what was not there") {
-  // particles of 1 cm^3, 2 mm apart from the hole on; 25 cm^3/s
-  FewParticles simulation(6, 0.5, 0.002);
-  Drain drain(decant::PoseTrack(decant::Pose{Eigen::Quaterniond::Identity(), {0.4, 0, 0}}), {0.1, 0, 0}, 25e-6);
-  drain.drain(simulation, 0.02);
-  CHECK(simulation.liquid.size() == 6);  // half a particle
-  drain.drain(simulation, 0.02);
-  REQUIRE(simulation.liquid.size() == 5);
-  CHECK(simulation.liquid.position(0, 0) == Approx(0.502));
-  drain.drain(simulation, 0.08);
-  CHECK(simulation.liquid.size() == 3);
-  CHECK(drain.removed() == Approx(3e-6));
-
-  FewParticles far(4, 0.6, 0.002);
-  drain.drain(far, 10);  // nothing within reach
-  CHECK(far.liquid.size() == 4);
-  FewParticles back(4, 0.5, 0.002);
-  drain.drain(back, 0.041);
-  CHECK(back.liquid.size() == 3);
 }
 
 TEST_CASE("fattened mask: a disc for each pixel, or one less of what is not liquid") {

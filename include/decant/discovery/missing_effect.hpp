@@ -67,6 +67,8 @@ class MissingEffectSearch {
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
+    expects(settings_.promising_factor >= 0, "MissingEffectSettings: promising_factor", ">= 0",
+            settings_.promising_factor);
     expects(settings_.alike_factor >= 1, "MissingEffectSettings: alike_factor", ">= 1", settings_.alike_factor);
     expects(settings_.most_unlike >= 0, "MissingEffectSettings: most_unlike", ">= 0", settings_.most_unlike);
     expects(settings_.least_references >= 2, "MissingEffectSettings: least_references", ">= 2",
@@ -112,15 +114,17 @@ class MissingEffectSearch {
       const bool gains =
           !refined.empty() && relative_fall(result.learn.after, refined.front().distance) > known.chance.fall;
       const bool down_to_chance = !refined.empty() && refined.front().distance <= known.chance.largest_distance;
-      const bool explains =
-          !refined.empty() &&
-          refined.front().share >= (down_to_chance ? settings_.least_share_to_chance : settings_.least_share);
+      // the more effects, the more of what nothing in the catalogue explains they can take over
+      const double together = round + 1;
+      const double least =
+          down_to_chance ? settings_.least_share_to_chance : 1 - (1 - settings_.least_share) / together;
+      const bool explains = !refined.empty() && refined.front().share >= least;
       if (round == 0) {
         for (const RefinedTogether& each : refined) {
           result.refined.push_back(each.effects.front());
         }
       }
-      if (!gains) {
+      if (!gains || (explained && !explains)) {  // what was found before stands
         break;
       }
       result.found = refined.front().effects;
@@ -130,7 +134,7 @@ class MissingEffectSearch {
         result.one_of = alike(result.refined, known.chance, result.learn.before);
       }
       if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
-          refined.front().share >= settings_.enough_share) {
+          refined.front().share >= settings_.enough_share || !is_promising(refined.front().share, together)) {
         break;
       }
     }
@@ -185,6 +189,12 @@ class MissingEffectSearch {
     return result;
   }
   const std::string& answer(const RefinedEffect& of) const { return effects()[of.effect].answer(); }
+
+  /// Whether it may pay to look for one more. Of effects that are all as strong, n of n + 1 explain that share; the
+  /// strongest are found first.
+  bool is_promising(double share, double effects) const {
+    return share >= settings_.promising_factor * effects / (effects + 1);
+  }
 
   /// Predicts recordings that were not used, with what was found and with its rivals, strengths as they were found.
   void check(const ComparedRecordings& known, InteractionRuns<Model>& make, MissingEffect& result) const {

@@ -20,10 +20,13 @@ struct MissingEffectSettings {
   int refinement_rounds = 3;           ///< steps for each, >= 1
   int repeats = 8;                     ///< of the best one, to see how far estimates scatter, >= 3
   int refinement_seeds = 2;            ///< runs at each point, >= 1
-  double least_share = 0.7;            ///< of what is reducible effects have to explain in the end, 0 .. 1
+  double least_share = 0.7;            ///< of what is reducible an effect has to explain in the end, 0 .. 1; several
+                                       ///< together may leave so many times less
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
   double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
                                        ///< what is left may be how the model has them
+  double promising_factor = 0.8;       ///< on n / (n + 1), >= 0: unless n effects explain so much, no further one is
+                                       ///< looked for
   double alike_factor = 2;             ///< on what chance explains, >= 1: what explains less than so much more is no
                                        ///< better an answer
   int most_effects = 3;                ///< that are added one after another, >= 1
