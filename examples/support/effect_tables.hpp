@@ -270,6 +270,37 @@ inline ExperimentSection strengths_and_held_out(const std::vector<EffectScore>& 
   return section;
 }
 
+/// Where what no catalogue has begins to be seen, and where it is said to. What is everywhere at once begins nowhere.
+inline ExperimentSection beginnings(const std::vector<EffectScore>& scores) {
+  using decant::detail::fixed_text;
+  ExperimentSection section{
+      "Where what is outside the catalogue begins",
+      decant::Table({"case", "hidden", "is seen from [s]", "at [px]", "said [s]", "at [px]", "off by [s]", "[px]"})};
+  std::size_t cases = 0, near = 0;
+  for (const EffectScore& each : scores) {
+    const nlohmann::json& result = *each.result;
+    const nlohmann::json& truth = result.at("truth");
+    if (each.role() != "outside" || truth.value("place", "world") == "world" || !truth.contains("seen_first_s")) {
+      continue;
+    }
+    const auto pixel = [](const nlohmann::json& json) {
+      return json.is_array() ? fixed_text(json[0], 0) + ", " + fixed_text(json[1], 0) : std::string("-");
+    };
+    const double late = number_at(result, "/onset_s") - number_at(truth, "/seen_first_s");
+    const double off = std::hypot(number_at(result, "/onset_px/0") - number_at(truth, "/seen_first_px/0"),
+                                  number_at(result, "/onset_px/1") - number_at(truth, "/seen_first_px/1"));
+    ++cases;
+    near += std::abs(late) <= 0.3 && off <= 60 ? 1 : 0;
+    section.table.add({case_name(*each.of), truth.at("effect"), fixed_text(number_at(truth, "/seen_first_s"), 2),
+                       pixel(truth.at("seen_first_px")), fixed_text(number_at(result, "/onset_s"), 2),
+                       pixel(result.at("onset_px")), fixed_text(late, 2), fixed_text(off, 0)});
+  }
+  section.note = "Within 0.3 s and 60 pixels: " + std::to_string(near) + " of " + std::to_string(cases) +
+                 ". Seen from: where clean masks of the same reality with and without it differ.";
+  section.json = {{"cases", cases}, {"within_0.3_s_and_60_px", near}};
+  return section;
+}
+
 inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
   using decant::detail::fixed_text;
   ExperimentSection section{
@@ -301,8 +332,13 @@ inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
 inline std::vector<ExperimentSection> effect_tables(const EffectExperiment& experiment,
                                                     const std::vector<EffectCase>& cases) {
   const std::vector<detail::EffectScore> scores = detail::scores_of(experiment, cases);
-  return {detail::answers_by_kind(scores), detail::confusion(scores), detail::strengths_and_held_out(scores),
-          detail::all_cases(scores)};
+  std::vector<ExperimentSection> sections{detail::answers_by_kind(scores), detail::confusion(scores),
+                                          detail::strengths_and_held_out(scores)};
+  if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "outside"; })) {
+    sections.push_back(detail::beginnings(scores));
+  }
+  sections.push_back(detail::all_cases(scores));
+  return sections;
 }
 
 }  // namespace example

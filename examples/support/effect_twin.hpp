@@ -16,6 +16,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -49,6 +50,7 @@
 #include "effect_forces.hpp"
 #include "effect_scenarios.hpp"
 #include "fattened_mask.hpp"
+#include "first_sight.hpp"
 #include "twin.hpp"
 
 namespace example {
@@ -463,6 +465,11 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   const BodyShape container = effect_container(plan.container).shape;
   const double recorded_volume = 1e-7 * std::round(1e7 * plan.fill * Cavity(container.mesh).volume());
   EffectReality<PressureSolverType> reality(hidden, effect, which, recorded_volume, settings.spacing);
+  // the same without the effect, to know where that can be seen
+  std::optional<EffectReality<PressureSolverType>> plain;
+  if (effect.family == "outside") {
+    plain.emplace(hidden, HiddenEffect{}, which, recorded_volume, settings.spacing);
+  }
 
   Recording header;
   header.name = "scenario" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
@@ -476,6 +483,11 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   }
   const auto [camera, camera_from_world] = true_camera(scenario, effect);
   TwinSight sight(camera, camera_from_world, {0, 0, 0}, reality.model());
+  std::optional<TwinSight> plain_sight;
+  if (plain) {
+    plain_sight.emplace(camera, camera_from_world, Vector3<double>(0, 0, 0), plain->model());
+  }
+  FirstSight first_sight;
   RecordedMotion recorded(hidden.scenario, which);
   const std::uint32_t noise_seed = mixed_seed({hidden.seed, 99U, static_cast<std::uint32_t>(which)});
   MaskNoise noise(noise_seed);
@@ -490,6 +502,10 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
     Mask seen = sight.look(reality.model());
+    if (plain) {
+      plain->advance(time);
+      first_sight.add(time, seen, plain_sight->look(plain->model()));
+    }
     if (effect.is("mask_bias")) {
       seen = fattened(seen, effect.strength);
     }
@@ -509,6 +525,10 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   nlohmann::json truth = effect_truth(hidden, effect, which, reality, settings.solver);
   truth["recorded_ml"] = 1e6 * recorded_volume;
   truth["removed_ml"] = 1e6 * reality.removed();
+  if (first_sight.found()) {
+    truth["seen_first_s"] = first_sight.found()->time;
+    truth["seen_first_px"] = {first_sight.found()->px.x(), first_sight.found()->px.y()};
+  }
   truth["volume_ml"] = {{plan.container, container_ml}, {"pan", pan_ml}};
   writer.set_truth(truth.dump());
   writer.finish();

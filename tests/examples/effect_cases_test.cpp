@@ -22,6 +22,7 @@
 
 #include "../../examples/support/effect_forces.hpp"
 #include "../../examples/support/fattened_mask.hpp"
+#include "../../examples/support/first_sight.hpp"
 #include "catch.hpp"
 
 using namespace example;
@@ -298,4 +299,33 @@ TEST_CASE("fattened mask: a disc for each pixel, or one less of what is not liqu
   CHECK(area(fattened(mask, -1)) == 0);
   decant::Mask full = decant::Mask::Constant(20, 30, decant::mask_liquid);
   CHECK((fattened(full, -2) == full).all());  // the picture's border is no edge of the liquid
+}
+
+TEST_CASE("first sight: from when on half of a square differs for good, and where") {
+  // 30 frames a second, windows of four; a block of pixels differs in some frames
+  const auto seen = [](int first, int last, int rows, bool more) {
+    FirstSight sight;
+    for (int frame = 0; frame < 24; ++frame) {
+      const decant::Mask without = decant::Mask::Constant(100, 130, more ? 0 : decant::mask_liquid);
+      decant::Mask with = without;
+      if (frame >= first && frame <= last) {
+        with.block(40, 60, rows, 20).setConstant(more ? decant::mask_liquid : 0);
+      }
+      sight.add(frame / 30.0, with, without);
+    }
+    return sight.found();
+  };
+  CHECK_FALSE(seen(100, 100, 20, true).has_value());
+  for (const bool more : {true, false}) {
+    const auto sight = seen(8, 23, 20, more);
+    REQUIRE(sight.has_value());
+    CHECK(sight->time == Approx(8 / 30.0));
+    CHECK(sight->px.x() == Approx(69.5));
+    CHECK(sight->px.y() == Approx(49.5));
+  }
+  CHECK(seen(7, 23, 20, true)->time == Approx(8 / 30.0));  // a quarter of the window before
+  CHECK(seen(5, 23, 20, true)->time == Approx(4 / 30.0));
+  CHECK_FALSE(seen(8, 11, 20, true).has_value());  // a drop
+  CHECK_FALSE(seen(8, 23, 9, true).has_value());
+  CHECK(seen(8, 23, 11, true).has_value());
 }
