@@ -13,7 +13,7 @@
 namespace example {
 
 /// Compares clean masks with and without what is hidden: in squares of 20 pixels, over four frames. It is seen from the
-/// first four frames on in which they differ by half of a square, if that square differs by as much in the next four,
+/// first four frames on in which they differ by 0.3 of a square, if that square differs by as much in the next four,
 /// too: single drops do not.
 class FirstSight {
  public:
@@ -53,7 +53,7 @@ class FirstSight {
 
  private:
   static constexpr int square = 20, frames = 4;
-  static constexpr double least = 0.5;
+  static constexpr double least = 0.3;
 
   static Eigen::Vector2d middle_of(const Eigen::ArrayXXd& differs) {
     Eigen::Vector2d sum = Eigen::Vector2d::Zero();

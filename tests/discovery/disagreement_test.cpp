@@ -44,7 +44,7 @@ std::size_t feature_at(const SilhouetteFeatures& features, std::size_t camera, i
 TEST_CASE("disagreement: what touches in space and time is one, with where it begins") {
   const SilhouetteFeatures features = features_everywhere();
   REQUIRE(features.size() == 2 * 5 * 8 * 10);
-  Eigen::VectorXd off = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(features.size()), 3.9);
+  Eigen::VectorXd off = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(features.size()), 2.9);
   const auto set = [&](std::size_t camera, int window, int row, int column, double value) {
     off[static_cast<Eigen::Index>(feature_at(features, camera, window, row, column))] = value;
   };
@@ -80,6 +80,33 @@ TEST_CASE("disagreement: what touches in space and time is one, with where it be
   CHECK(found[2].camera == 1);
   CHECK(found[3].weight == Approx(4.5 * 4.5));
   CHECK(found[4].begin == Approx(2.4));
+}
+
+TEST_CASE("disagreement: what begins small belongs to it, and much that is small counts where it touches") {
+  const SilhouetteFeatures features = features_everywhere();
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features.size()));
+  const auto set = [&](int window, int row, int column, double value) {
+    off[static_cast<Eigen::Index>(feature_at(features, 0, window, row, column))] = value;
+  };
+  set(2, 1, 1, 3.1);  // small at first
+  set(3, 1, 1, -3.9);
+  set(3, 1, 2, 4.1);
+  for (const int window : {0, 1, 2}) {  // three do not count
+    set(window, 6, 8, 3.9);
+  }
+  std::vector<Disagreement> found = find_disagreements(features, off);
+  REQUIRE(found.size() == 1);
+  CHECK(found[0].squares == 2);
+  CHECK(found[0].begin == Approx(2.2));
+  CHECK(found[0].onset_u == Approx(14.5));
+  set(0, 5, 7, 3.01);
+  found = find_disagreements(features, off);
+  REQUIRE(found.size() == 2);
+  CHECK(found[0].squares == 4);
+  CHECK(found[0].begin == Approx(2));
+  CHECK(found[0].onset_u == Approx((3.9 * 84.5 + 3.01 * 74.5) / 6.91));
+  set(0, 5, 7, 2.99);
+  CHECK(find_disagreements(features, off).size() == 1);
 }
 
 TEST_CASE("disagreement: nothing beyond the threshold is nothing, and arguments are checked") {

@@ -301,7 +301,7 @@ TEST_CASE("fattened mask: a disc for each pixel, or one less of what is not liqu
   CHECK((fattened(full, -2) == full).all());  // the picture's border is no edge of the liquid
 }
 
-TEST_CASE("first sight: from when on half of a square differs for good, and where") {
+TEST_CASE("first sight: from when on a square differs for good, and where") {
   // 30 frames a second, windows of four; a block of pixels differs in some frames
   const auto seen = [](int first, int last, int rows, bool more) {
     FirstSight sight;
@@ -324,8 +324,8 @@ TEST_CASE("first sight: from when on half of a square differs for good, and wher
     CHECK(sight->px.y() == Approx(49.5));
   }
   CHECK(seen(7, 23, 20, true)->time == Approx(8 / 30.0));  // a quarter of the window before
-  CHECK(seen(5, 23, 20, true)->time == Approx(4 / 30.0));
+  CHECK(seen(6, 23, 20, true)->time == Approx(4 / 30.0));  // a half
   CHECK_FALSE(seen(8, 11, 20, true).has_value());  // a drop
-  CHECK_FALSE(seen(8, 23, 9, true).has_value());
-  CHECK(seen(8, 23, 11, true).has_value());
+  CHECK_FALSE(seen(8, 23, 5, true).has_value());
+  CHECK(seen(8, 23, 7, true).has_value());
 }

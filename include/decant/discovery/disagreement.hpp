@@ -35,7 +35,8 @@ struct Disagreement {
 
 /// @param features where and when they are.
 /// @param off by feature: how far it is from what is expected, in its standard deviations where nothing is missing.
-/// @param threshold beyond which a feature disagrees, > 0.
+/// @param threshold beyond which a feature disagrees, > 0. Four that touch each other do already from three quarters of
+/// it on, as chance hardly puts them side by side, and so does what touches one that is beyond it: things begin small.
 /// @return the heaviest first; empty where it is small everywhere, though it may still be much together.
 /// Throws std::invalid_argument if there are not as many as features, or the threshold is out of range.
 inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& features, const Eigen::VectorXd& off,
@@ -43,10 +44,12 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
   expects(off.size() == static_cast<Eigen::Index>(features.size()), "find_disagreements: deviations",
           "as many as features", off.size());
   expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
+  constexpr std::size_t many = 4;
+  const double low = 0.75 * threshold;
   using Key = std::array<int, 4>;  // camera, window, row, column
   std::map<Key, std::size_t> beyond;
   for (std::size_t k = 0; k < features.size(); ++k) {
-    if (std::abs(off[static_cast<Eigen::Index>(k)]) > threshold) {
+    if (std::abs(off[static_cast<Eigen::Index>(k)]) > low) {
       const SilhouetteFeatures::Place& place = features.place(k);
       beyond[{static_cast<int>(place.camera), place.window, place.row, place.column}] = k;
     }
@@ -98,7 +101,9 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     }
     one.onset_u /= total;
     one.onset_v /= total;
-    found.push_back(one);
+    if (one.largest > threshold || one.squares >= many) {
+      found.push_back(one);
+    }
   }
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.weight > b.weight; });
   return found;
