@@ -46,7 +46,7 @@ struct EffectEntry {
 inline const std::vector<EffectEntry>& hidden_effects() {
   static const std::vector<EffectEntry> entries{
       {"drag_quadratic", "drag", "1/m", 0.9, 1.5},
-      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3},  // over that of water; in turn with shear_thinning()
+      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3},  // over that of water; in turn with shear_thinning
       {"surface_tension", "surface_tension", "N/m", 0.15, 0.30},
       {"wall_friction", "wall_friction", "1/s", 20, 50},   // at a spacing of 5 mm
       {"wall_adhesion", "wall_adhesion", "m/s^2", 8, 18},  // at a spacing of 5 mm

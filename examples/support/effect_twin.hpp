@@ -502,7 +502,7 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
     Mask seen = sight.look(reality.model());
-    if (plain) {
+    if (plain && !first_sight.found()) {
       plain->advance(time);
       first_sight.add(time, seen, plain_sight->look(plain->model()));
     }

@@ -3,7 +3,6 @@
 
 /// When and where something can be seen first: what an answer to "where does it begin?" is scored by.
 
-#include <algorithm>
 #include <optional>
 
 #include <Eigen/Core>
@@ -22,7 +21,7 @@ class FirstSight {
     Eigen::Vector2d px;  ///< middle of what differs, by how much it does
   };
 
-  /// The next frame's masks, of one size throughout.
+  /// The next frame's masks, of one size throughout. Once it is found, others change nothing.
   void add(double time, const decant::Mask& with, const decant::Mask& without) {
     if (found_) {
       return;

@@ -280,6 +280,19 @@ TEST_CASE("missing effect: the more effects, the less they may leave, and one th
   CHECK(one.runs < two.runs);
 }
 
+TEST_CASE("missing effect: what explains enough alone stands where a second one does not explain enough") {
+  MissingEffectSettings settings;
+  settings.least_share = 0.54;  // two would have to explain 0.77; they explain 0.55 and 0.76 of a gust
+  settings.least_share_to_chance = 1;
+  const MissingEffect result = found_in({0, 0, 1, 0, 4}, 75, settings);
+  CHECK(result.verdict == Verdict::Named);
+  REQUIRE(result.found.size() == 1);
+  CHECK(result.found.front().share == result.refined.front().share);
+  CHECK(result.learn.after == result.found.front().distance);
+  settings.promising_factor = 2;
+  CHECK(found_in({0, 0, 1, 0, 4}, 75, settings).runs < result.runs);  // a second one was looked for
+}
+
 TEST_CASE("missing effect: runs that fail are left out, and no run is made twice") {
   JetModel model(0.9);
   model.broken_above = 0.75;  // half the range: the stronger of both runs fails

@@ -65,6 +65,9 @@ class MissingEffectSearch {
     expects(settings_.refined >= 1 && settings_.refinement_rounds >= 1 && settings_.refinement_seeds >= 1,
             "MissingEffectSettings: refined, refinement_rounds, refinement_seeds", ">= 1", settings_.refined);
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
+    for (const double share : {settings_.least_share, settings_.least_share_to_chance}) {
+      expects(share >= 0 && share <= 1, "MissingEffectSettings: least_share, least_share_to_chance", "0 .. 1", share);
+    }
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
     expects(settings_.promising_factor >= 0, "MissingEffectSettings: promising_factor", ">= 0",
