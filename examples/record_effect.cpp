@@ -50,6 +50,7 @@ int main(int count, char** values) {
   app.add_option("--solver", settings.solver, "of the reality: divergence_free, as models have it, or position_based")
       ->transform(CLI::CheckedTransformer(example::reality_solvers()));
   app.add_option("--spacing-mm", spacing_mm, "of the reality's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--frames-per-second", settings.frames_per_second)->check(CLI::Range(1.0, 240.0));
   app.add_option("--seconds", settings.longest, "cuts pours off there")->check(CLI::Range(0.1, 60.0));
   try {
     app.parse(count, values);

@@ -74,7 +74,7 @@ struct EffectRecordingSettings {
   double longest = std::numeric_limits<double>::infinity();  ///< a pour is cut off there [s]
   bool with_effect = true;   ///< false: the same errors and noise, but nothing is hidden
   bool truth_masks = false;  ///< clean silhouettes beside the recording
-  static constexpr double frames_per_second = 30;
+  double frames_per_second = 30;
 };
 
 /// All effects are there, and cost nothing where they are zero.

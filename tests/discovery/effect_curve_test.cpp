@@ -39,12 +39,12 @@ NuisanceSpace plain_space(double deviation = 0.3) {
 
 /// Of one component.
 EffectCurve curve_of(const NuisanceSpace& space, const std::vector<double>& strengths, const MatrixXd& differences,
-                     double base = 0, bool saturating = false) {
+                     double base = 0, double chaos = 0) {
   std::vector<EffectCurve::Strength> each;
   for (const double strength : strengths) {
     each.push_back(VectorXd::Constant(1, strength));
   }
-  return {space, {{base, saturating}}, each, differences};
+  return {space, VectorXd::Constant(1, base), each, differences, chaos};
 }
 
 VectorXd one(double strength) { return VectorXd::Constant(1, strength); }
@@ -56,21 +56,20 @@ TEST_CASE("effect curve: finds the strength by which features changed, from othe
   const NuisanceSpace space = plain_space();
   Features draw(1);
   const VectorXd first = draw.noise(1), second = draw.noise(1);
-  // what is simulated is not quite the curve's law
-  const auto changed = [&](double s, bool saturating) {
-    const double grown = saturating ? s / (0.3 + s) : s, bent = saturating ? 0 : 0.2 * s * s;
-    return VectorXd(grown * first + bent * second);
-  };
-  for (const bool saturating : {false, true}) {
-    const std::vector<double> strengths{0.7, 0.7, 1.5, 1.5, 3, 3};
-    MatrixXd differences(curve_features, 6);
-    for (Index k = 0; k < 6; ++k) {
-      differences.col(k) = changed(strengths[static_cast<std::size_t>(k)], saturating) + draw.noise(1, 0.1);
+  // what is simulated is not quite the curve's law: it bends to another side, and grows more and more, or less and less
+  for (const double power : {1.0, 0.4, 1.8}) {
+    const auto changed = [&](double s) {
+      return VectorXd(3 * std::pow(s / 3, power) * first + 0.1 * s * (3 - s) * second);
+    };
+    const std::vector<double> strengths{1, 1, 3, 3};
+    MatrixXd differences(curve_features, 4);
+    for (Index k = 0; k < 4; ++k) {
+      differences.col(k) = changed(strengths[static_cast<std::size_t>(k)]) + draw.noise(1, 0.1);
     }
-    const EffectCurve curve = curve_of(space, strengths, differences, 0, saturating);
+    const EffectCurve curve = curve_of(space, strengths, differences);
     CHECK(curve.axes().front().range == std::pair(0.0, 3.0));
-    for (const double truth : {0.4, 1.1, 2.2}) {
-      const VectorXd seen = space.standardised(space.center() + changed(truth, saturating) + draw.noise(1, 0.3));
+    for (const double truth : {0.9, 1.3, 2.2}) {
+      const VectorXd seen = space.standardised(space.center() + changed(truth) + draw.noise(1, 0.3));
       const StrengthProfile profile = curve.profile(seen);
       CHECK(profile.best()[0] == Approx(truth).epsilon(0.15).margin(0.05));
       CHECK(profile.without() == Approx(space.distance(seen)));
@@ -78,6 +77,26 @@ TEST_CASE("effect curve: finds the strength by which features changed, from othe
       CHECK(profile(profile.best()) < 2);
     }
   }
+}
+
+TEST_CASE("effect curve: how an effect grows is learnt from simulations, the less the more of them is chaos") {
+  const NuisanceSpace space = plain_space();
+  Features draw(5);
+  const VectorXd way = draw.noise(1);
+  const auto growth = [&](double weaker, double size, double chaos) {
+    MatrixXd differences(curve_features, 2);
+    differences << weaker * size * way, size * way;
+    return curve_of(space, {0.35, 1}, differences, 0, chaos).axes().front().law.growth;
+  };
+  const double energy = space.distance(space.standardised_difference(way));
+  // a third of the strength does a fifth, or two thirds, of it
+  CHECK(growth(0.35, 1, 0) == 1);
+  CHECK(growth(0.2, 1, 0) == Approx(0.35 * 0.8 / (0.65 * 0.2)).epsilon(0.03));
+  CHECK(growth(0.65, 1, 0) == Approx(0.35 * 0.35 / (0.65 * 0.65)).epsilon(0.03));
+  CHECK(growth(0.2, 1, 0.01 * energy) == Approx(growth(0.2, 1, 0)).epsilon(0.1));
+  // what chaos drowns is taken for a straight line
+  CHECK(growth(0.2, 0.1, energy) == Approx(1).epsilon(0.1));
+  CHECK(growth(0.65, 0.1, energy) == Approx(1).epsilon(0.1));
 }
 
 TEST_CASE("effect curve: what chaos makes of weak effects is held back, and strong ones are as they were simulated") {
@@ -96,7 +115,7 @@ TEST_CASE("effect curve: what chaos makes of weak effects is held back, and stro
         differences.col(k) = size * (s * way + s * s * bend) + draw.noise(1, 0.3);
       }
       std::vector<EffectCurve::Strength> each{one(0.35), one(1)};
-      const EffectCurve curve(space, {{0, false}}, each, differences, told);
+      const EffectCurve curve(space, one(0), each, differences, told);
       sum += space.distance(curve.at(one(at)) - space.standardised_difference(size * (at * way + at * at * bend)));
     }
     return sum / 10;
@@ -143,7 +162,7 @@ TEST_CASE("strength profile: an interval holds what is hardly worse, and pours a
   CHECK(profile.within(0, 100 * unit) == std::pair(0.0, 4.0));
 
   StrengthProfile both = profile;
-  both += other.profile(seen(2.5 * other_way));
+  both += other.profile(seen(2.5 * other_way));  // which has laws of its own
   const double other_unit = space.distance(seen(other_way));
   CHECK(both.best()[0] == Approx((1.5 * unit + 2.5 * other_unit) / (unit + other_unit)).epsilon(1e-4));
   CHECK(both.without() == Approx(2.25 * unit + 6.25 * other_unit));
@@ -157,7 +176,7 @@ TEST_CASE("effect curve: components add up, and each has its own strength and in
   // the second one bends, and both are simulated alone
   MatrixXd differences(curve_features, 4);
   differences << 2 * across, -2 * across, along + 0.5 * bend, -along + 0.5 * bend;
-  const EffectCurve curve(space, {{0}, {10}}, {two(2, 10), two(-2, 10), two(0, 11), two(0, 9)}, differences);
+  const EffectCurve curve(space, two(0, 10), {two(2, 10), two(-2, 10), two(0, 11), two(0, 9)}, differences);
   CHECK(curve.axes()[1].range == std::pair(9.0, 11.0));
   const VectorXd change = -0.7 * across + 0.6 * along + 0.36 * 0.5 * bend;
   const StrengthProfile profile = curve.profile(space.standardised_difference(change));
@@ -170,7 +189,7 @@ TEST_CASE("effect curve: components add up, and each has its own strength and in
   // Two that look alike: each alone can be anything as long as their sum fits, which an interval has to say.
   MatrixXd alike(curve_features, 2);
   alike << across, across + 0.01 * along;
-  const EffectCurve same(space, {{0}, {0}}, {two(1, 0), two(0, 1)}, alike);
+  const EffectCurve same(space, two(0, 0), {two(1, 0), two(0, 1)}, alike);
   const StrengthProfile unsure = same.profile(space.standardised_difference(across));
   const double unit = space.distance(space.standardised_difference(across));
   const auto [from, to] = unsure.within(0, 0.1 * unit);
@@ -192,8 +211,8 @@ TEST_CASE("effect curve: simulations are checked") {
                     decant_test::contains("strength must be finite"));
   const double no = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH(curve_of(space, {1, 2}, no * both), decant_test::contains("features must be finite"));
-  CHECK_THROWS_WITH(EffectCurve(space, {{0}, {0}}, {one(1), one(2)}, both),
+  CHECK_THROWS_WITH(EffectCurve(space, two(0, 0), {one(1), one(2)}, both),
                     decant_test::contains("a number for each component"));
-  CHECK_THROWS_WITH(EffectCurve(space, {{0}, {0}}, {two(1, 0), two(2, 0)}, both),
+  CHECK_THROWS_WITH(EffectCurve(space, two(0, 0), {two(1, 0), two(2, 0)}, both),
                     decant_test::contains("other than the base"));
 }

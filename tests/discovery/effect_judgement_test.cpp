@@ -28,7 +28,7 @@ Effect named(const std::string& name, const std::string& family = "") {
 
 /// An effect whose distance falls from `without` by `improvement` at a strength of 1/2, as a parabola.
 StrengthProfile falling(double without, double improvement) {
-  return {{{{0, 1, false}, {-1, 1}}},
+  return {{{{0, 1, 1, true}, {-1, 1}}},
           without,
           Eigen::Vector2d(2 * improvement, 0),
           Eigen::Vector2d(4 * improvement, 0).asDiagonal()};
@@ -148,7 +148,7 @@ TEST_CASE("effect judgement: several recordings have one strength") {
   const std::vector<Effect> effects{named("pull"), named("drag")};
   // alone each is explained by either; at one strength for both only the pull does
   EffectEvidence first = evidence(5, {3, 3}), second = evidence(5, {3, 0});
-  second.profile[1] = StrengthProfile({{{0, 1, false}, {-1, 1}}}, 5, Eigen::Vector2d(-6, 0),
+  second.profile[1] = StrengthProfile({{{0, 1, 1, true}, {-1, 1}}}, 5, Eigen::Vector2d(-6, 0),
                                       Eigen::Vector2d(12, 0).asDiagonal());  // best at -1/2
   CHECK(judge_effects(effects, {first}, usual_chance()).verdict == Verdict::OneOf);
   CHECK(judge_effects(effects, {second}, usual_chance()).verdict == Verdict::OneOf);

@@ -20,13 +20,12 @@ namespace decant::inline DECANT_TARGET {
 
 /// A number that says how strong an effect is: a drag has one, a sideways pull one for each direction.
 struct EffectComponent {
-  std::string name{};       ///< such as "x"; empty where there is one component only
-  double base = 0;          ///< what the model has
-  double low = 0;           ///< the range that is looked through, low <= base <= high, not both equal
-  double high = 1;          ///<
-  double tolerance = 0;     ///< up to so much off the base nothing is missing, >= 0: it is drawn with all else that is
-                            ///< tolerated; 0: the model is sure of it
-  bool saturating = false;  ///< more and more of it matters less and less, see StrengthLaw
+  std::string name{};    ///< such as "x"; empty where there is one component only
+  double base = 0;       ///< what the model has
+  double low = 0;        ///< the range that is looked through, low <= base <= high, not both equal
+  double high = 1;       ///<
+  double tolerance = 0;  ///< up to so much off the base nothing is missing, >= 0: it is drawn with all else that is
+                         ///< tolerated; 0: the model is sure of it
 };
 
 /// What an effect is about.

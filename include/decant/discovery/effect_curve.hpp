@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,51 +21,49 @@
 
 namespace decant::inline DECANT_TARGET {
 
-/// One component of an effect's strength, as a model has it.
-struct StrengthBase {
-  double base = 0;          ///< what the model has
-  bool saturating = false;  ///< see StrengthLaw
-};
-
 /// A curve through standardised features, fitted to simulations with the effect less the baseline by least squares.
-/// Two coefficients per feature and component smooth what is chaotic in single simulations; components add up. The
-/// second one, by which the effect is not in proportion to the law's first term, is held back as far as chaos drowns
-/// it: c minimises sum |d - c1 p1 - c2 p2|^2 + l |c2|^2, where l is the variance of chaos over what the second
-/// coefficient is expected to be, which is as large as the effect is at its largest strength (ridge regression: Hoerl
-/// and Kennard, Technometrics 12, 1970). So weak effects are straight lines and strong ones as they were simulated.
-/// Beyond the simulated strengths it says nothing.
+/// Two coefficients per feature and component smooth what is chaotic in single simulations; components add up. How an
+/// effect grows with its strength (StrengthLaw::growth) is what weaker simulations have of the strongest ones. The
+/// second coefficient, by which weaker simulations do something else, is held back as far as chaos drowns it: c
+/// minimises sum |d - c1 p1 - c2 p2|^2 + l |c2|^2, where l is the variance of chaos over what the second coefficient is
+/// expected to be, which is as large as the effect is at its largest strength (ridge regression: Hoerl and Kennard,
+/// Technometrics 12, 1970). So weak effects do the same at every strength, more or less of it, and strong ones what was
+/// simulated. Beyond the simulated strengths it says nothing.
 class EffectCurve {
  public:
   using Strength = StrengthProfile::Strength;
 
   /// @param space has to outlive it.
-  /// @param components one to three. @param strengths of each simulation, by component; each component has one or more
-  /// other than its base, and several simulations may have the same (other seeds).
+  /// @param base what the model has, one to three components. @param strengths of each simulation, by component; each
+  /// component has one or more other than its base, and several simulations may have the same (other seeds).
   /// @param differences p x as many: features less the space's center. @param chaos distance of a single simulation
   /// from the mean of many, >= 0; 0 goes through all simulations as closely as two coefficients can. Throws
   /// std::invalid_argument if numbers do not fit or are not finite.
-  EffectCurve(const NuisanceSpace& space, const std::vector<StrengthBase>& components,
-              const std::vector<Strength>& strengths, const Eigen::MatrixXd& differences, double chaos = 0)
-      : space_(&space), axes_(components.size()) {
+  EffectCurve(const NuisanceSpace& space, const Strength& base, const std::vector<Strength>& strengths,
+              const Eigen::MatrixXd& differences, double chaos = 0)
+      : space_(&space), axes_(static_cast<std::size_t>(base.size())) {
     expects(differences.rows() == space.features(), "EffectCurve: features", "as many as of the space",
             differences.rows());
     expects(differences.cols() == static_cast<Eigen::Index>(strengths.size()), "EffectCurve: strengths",
             "one for each simulation", strengths.size());
     expects(differences.allFinite(), "EffectCurve: features", "finite", "others");
+    Eigen::MatrixXd standardised(differences.rows(), differences.cols());
+    for (Eigen::Index k = 0; k < differences.cols(); ++k) {
+      standardised.col(k) = space.standardised_difference(differences.col(k));
+    }
     std::vector<Eigen::Index> used;  // of the terms of all laws
-    for (std::size_t k = 0; k < components.size(); ++k) {
-      const std::size_t distinct = set_axis(k, components[k], strengths);
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      const std::size_t distinct = set_axis(k, base[static_cast<Eigen::Index>(k)], strengths);
+      axes_[k].law.growth = growth(k, strengths, standardised, chaos);
       used.push_back(static_cast<Eigen::Index>(2 * k));
       if (distinct > 1) {
         used.push_back(static_cast<Eigen::Index>(2 * k + 1));
       }
     }
     Eigen::MatrixXd at(static_cast<Eigen::Index>(used.size()), differences.cols());
-    Eigen::MatrixXd standardised(differences.rows(), differences.cols());
     for (Eigen::Index k = 0; k < differences.cols(); ++k) {
       const Eigen::VectorXd phi = detail::strength_terms(axes_, strengths[static_cast<std::size_t>(k)]);
       at.col(k) = phi(used);
-      standardised.col(k) = space.standardised_difference(differences.col(k));
     }
     const Eigen::MatrixXd normal = at * at.transpose();
     Eigen::MatrixXd held_back = normal;
@@ -76,7 +74,7 @@ class EffectCurve {
       }
     }
     const Eigen::MatrixXd solved = held_back.ldlt().solve(at * standardised.transpose()).transpose();
-    const auto count = static_cast<Eigen::Index>(2 * components.size());
+    const auto count = static_cast<Eigen::Index>(2 * axes_.size());
     uncertainty_.setZero(count, count);
     const Eigen::MatrixXd inverse = held_back.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
     uncertainty_(used, used) = inverse * normal * inverse;
@@ -118,22 +116,81 @@ class EffectCurve {
 
  private:
   /// @return how many strengths other than the base there are.
-  std::size_t set_axis(std::size_t component, const StrengthBase& of, const std::vector<Strength>& strengths) {
+  std::size_t set_axis(std::size_t component, double base, const std::vector<Strength>& strengths) {
     std::set<double> distinct;
-    std::pair<double, double> range{of.base, of.base};
+    std::pair<double, double> range{base, base};
     for (const Strength& each : strengths) {
       expects(each.size() == static_cast<Eigen::Index>(axes_.size()), "EffectCurve: strength of a simulation",
               "a number for each component", each.size());
       const double strength = each[static_cast<Eigen::Index>(component)];
       expects(std::isfinite(strength), "EffectCurve: strength", "finite", strength);
       range = {std::min(range.first, strength), std::max(range.second, strength)};
-      if (strength != of.base) {
+      if (strength != base) {
         distinct.insert(strength);
       }
     }
-    expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", of.base);
-    axes_[component] = {{of.base, std::max(range.second - of.base, of.base - range.first), of.saturating}, range};
+    expects(!distinct.empty(), "EffectCurve: strengths", "at least one other than the base", base);
+    axes_[component].range = range;
+    axes_[component].law = {base, std::max(range.second - base, base - range.first), 1,
+                            range.first < base && base < range.second};
     return distinct.size();
+  }
+
+  /// How an effect grows: by what simulations with weaker ones have of the mean of those with the strongest one, to
+  /// each side. Of weak effects little is known, and a straight line (1) is as likely as anything: the logarithm of a
+  /// growth has a standard deviation of 1 beforehand, and chaos has a tenth of its distance in one direction.
+  double growth(std::size_t component, const std::vector<Strength>& strengths, const Eigen::MatrixXd& standardised,
+                double chaos) const {
+    struct Weaker {
+      double share, inner, energy;
+    };
+    const auto index = static_cast<Eigen::Index>(component);
+    StrengthLaw law = axes_[component].law;
+    std::vector<Weaker> weaker;
+    for (const double side : {-1.0, 1.0}) {
+      const auto share = [&](const Strength& strength) { return side * (strength[index] - law.base) / law.scale; };
+      Eigen::VectorXd strongest = Eigen::VectorXd::Zero(standardised.rows());
+      double count = 0;
+      for (std::size_t k = 0; k < strengths.size(); ++k) {
+        if (share(strengths[k]) >= 0.999) {
+          strongest += standardised.col(static_cast<Eigen::Index>(k));
+          count += 1;
+        }
+      }
+      if (count > 0) {
+        strongest /= count;
+        const double energy = std::max(space_->distance(strongest) - chaos / count, 0.05 * chaos);
+        for (std::size_t k = 0; k < strengths.size() && energy > 0; ++k) {
+          if (const double of = share(strengths[k]); of > 0 && of < 0.999 && alone(component, strengths[k])) {
+            weaker.push_back({of, space_->inner(standardised.col(static_cast<Eigen::Index>(k)), strongest), energy});
+          }
+        }
+      }
+    }
+    double best = 1, least = std::numeric_limits<double>::infinity();
+    for (int step = -40; step <= 40 && !weaker.empty(); ++step) {
+      const double logarithm = 0.045 * step;
+      law.growth = std::exp(logarithm);
+      double cost = 0.1 * chaos * logarithm * logarithm;
+      for (const Weaker& each : weaker) {
+        const double off = each.inner / each.energy - law(law.base + each.share * law.scale)[0];
+        cost += each.energy * off * off;
+      }
+      if (cost < least) {
+        least = cost;
+        best = law.growth;
+      }
+    }
+    return best;
+  }
+  /// Whether all other components are at their bases.
+  bool alone(std::size_t component, const Strength& strength) const {
+    for (std::size_t k = 0; k < axes_.size(); ++k) {
+      if (k != component && strength[static_cast<Eigen::Index>(k)] != axes_[k].law.base) {
+        return false;
+      }
+    }
+    return true;
   }
 
   /// The mean distance of simulations at a component's largest strength.

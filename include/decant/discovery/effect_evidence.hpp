@@ -255,17 +255,13 @@ class RecordedEvidence {
 
   EffectCurve curve(std::size_t effect, const std::vector<std::size_t>& runs, const NuisanceSpace& space,
                     double chaotic) const {
-    std::vector<StrengthBase> components;
-    for (const EffectComponent& each : dictionary_->effects[effect].components) {
-      components.push_back({each.base, each.saturating});
-    }
     std::vector<Eigen::VectorXd> strengths;
     Eigen::MatrixXd differences(space.features(), static_cast<Eigen::Index>(runs.size()));
     for (std::size_t k = 0; k < runs.size(); ++k) {
       strengths.push_back(dictionary_->strength(runs[k]));
       differences.col(static_cast<Eigen::Index>(k)) = of_run_.at(runs[k]) - space.center();
     }
-    return EffectCurve(space, components, strengths, differences, chaotic);
+    return EffectCurve(space, dictionary_->effects[effect].base(), strengths, differences, chaotic);
   }
 
   template <class Gap>
@@ -278,7 +274,7 @@ class RecordedEvidence {
     return sum / static_cast<double>(runs.size());
   }
 
-  /// The gap follows the same law of the strength as features do.
+  /// The gap shrinks with the strength and its square.
   template <class Gap>
   double gain(std::size_t effect, const std::vector<std::size_t>& runs, double without, const Gap& gap) const {
     const Effect& of = dictionary_->effects[effect];
@@ -296,7 +292,7 @@ class RecordedEvidence {
           high = std::max(high, s);
         }
       }
-      const StrengthLaw law{with.base, std::max(high - with.base, with.base - low), with.saturating};
+      const StrengthLaw law{with.base, std::max(high - with.base, with.base - low), 1, true};
       const Eigen::Index terms = strength.size() > 1 ? 2 : 1;
       Eigen::MatrixXd at(static_cast<Eigen::Index>(strength.size()), terms);
       for (std::size_t k = 0; k < strength.size(); ++k) {

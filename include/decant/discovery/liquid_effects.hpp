@@ -161,14 +161,14 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
   effects.push_back(force_effect<ShearThinningViscosity<Scalar>, Model>(
       plain_effect("viscosity", "viscosity", "m^2/s", "the liquid is thicker than assumed",
                    {"", kinematic_viscosity, kinematic_viscosity, std::max(thick, 10 * kinematic_viscosity),
-                    std::max(2e-5, kinematic_viscosity), true},
+                    std::max(2e-5, kinematic_viscosity)},
                    "simulator.force<ShearThinningViscosity<float>>().kinematic_viscosity = @;"),
       [](auto& force, double s) { force.kinematic_viscosity = static_cast<Scalar>(s); }));
   effects.push_back(force_effect<ShearThinningViscosity<Scalar>, Model>(
       plain_effect(
           "shear_thinning", "viscosity", "m^2/s",
           "the liquid is thick at rest and the thinner the faster it is sheared (its strength is that at rest)",
-          {"", kinematic_viscosity, kinematic_viscosity, std::max(4 * thick, 10 * kinematic_viscosity), 0, true},
+          {"", kinematic_viscosity, kinematic_viscosity, std::max(4 * thick, 10 * kinematic_viscosity)},
           "auto& friction = simulator.force<ShearThinningViscosity<float>>(); friction.kinematic_viscosity = @; "
           "friction.high_shear_viscosity = assumed; friction.relaxation_time = 0.1F; friction.exponent = 0.4F;"),
       [kinematic_viscosity](auto& force, double s) {
@@ -179,10 +179,10 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
       }));
   effects.push_back(force_effect<SurfaceTension<Scalar>, Model>(
       plain_effect("surface_tension", "", "N/m", "the liquid's surface holds together more than assumed",
-                   {"", 0, 0, 0.3, 0.02, true}, "simulator.force<SurfaceTension<float>>().surface_tension = @;"),
+                   {"", 0, 0, 0.3, 0.02}, "simulator.force<SurfaceTension<float>>().surface_tension = @;"),
       [](auto& force, double s) { force.surface_tension = static_cast<Scalar>(s); }));
   effects.push_back(force_effect<WallFriction<Scalar>, Model>(
-      plain_effect("wall_friction", "", "1/s", "walls slow the liquid that touches them", {"", 0, 0, 60, 1, true},
+      plain_effect("wall_friction", "", "1/s", "walls slow the liquid that touches them", {"", 0, 0, 60, 1},
                    "simulator.force<WallFriction<float>>().rate = @;"),
       [](auto& force, double s) { force.rate = static_cast<Scalar>(s); }));
   effects.push_back(force_effect<WallAdhesion<Scalar>, Model>(

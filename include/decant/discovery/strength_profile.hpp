@@ -18,26 +18,26 @@
 namespace decant::inline DECANT_TARGET {
 
 /// How features answer one component of an effect as its strength s grows from what the model has, u = (s - base) /
-/// scale: c_1 u + c_2 u^2, or c_1 u / (0.15 + |u|) + c_2 u where they answer less and less (viscosity, friction at
-/// walls).
+/// scale: c_1 u / (|u| + growth (1 - |u|)) + c_2 bend. The first term is a straight line for a growth of 1, answers
+/// less and less below (friction at walls) and more and more above (a stream that begins to cling). The second one is
+/// what weaker effects do that the strongest one does not: u (1 - |u|); or u^2 where strengths lie to both sides of the
+/// base.
 struct StrengthLaw {
-  double base = 0;   ///< strength that the model has
-  double scale = 1;  ///< > 0: the largest |s - base| that is asked about
-  bool saturating = false;
+  double base = 0;    ///< strength that the model has
+  double scale = 1;   ///< > 0: the largest |s - base| that is asked about
+  double growth = 1;  ///< > 0
+  bool two_sided = false;
 
   std::array<double, 2> operator()(double strength) const noexcept {
-    const double u = (strength - base) / scale;
-    return saturating ? std::array{u / (0.15 + std::abs(u)), u} : std::array{u, u * u};
+    const double u = (strength - base) / scale, share = std::min(std::abs(u), 1.0);
+    return {u / (share + growth * (1 - share)), two_sided ? u * u : u * (1 - share)};
   }
-  bool operator==(const StrengthLaw&) const = default;
 };
 
 /// One component of a strength (a drag has one, a sideways pull has two), and which values of it are asked about.
 struct StrengthAxis {
   StrengthLaw law{};
   std::pair<double, double> range{0, 0};  ///< the lower first
-
-  bool operator==(const StrengthAxis&) const = default;
 };
 
 namespace detail {
@@ -56,7 +56,7 @@ inline Eigen::VectorXd strength_terms(const std::vector<StrengthAxis>& axes, con
 }  // namespace detail
 
 /// Distances d(s) = d_0 - 2 b . phi(s) + phi(s)' G phi(s), phi being the laws of all components one after another.
-/// Those of several pours with one strength add up.
+/// Those of several pours with one strength add up, each with laws of its own.
 class StrengthProfile {
  public:
   using Strength = Eigen::VectorXd;  ///< a number for each component
@@ -64,24 +64,32 @@ class StrengthProfile {
   /// @param axes one to three, by component. @param without d_0: the distance at the laws' bases. @param answer b.
   /// @param square G.
   StrengthProfile(std::vector<StrengthAxis> axes, double without, Eigen::VectorXd answer, Eigen::MatrixXd square)
-      : axes_(std::move(axes)), without_(without), answer_(std::move(answer)), square_(std::move(square)) {
-    const auto terms = static_cast<Eigen::Index>(2 * axes_.size());
-    expects(!axes_.empty() && axes_.size() <= 3, "StrengthProfile: components", "1 .. 3", axes_.size());
-    expects(answer_.size() == terms && square_.rows() == terms && square_.cols() == terms, "StrengthProfile: terms",
-            "two for each component", answer_.size());
-    for (const StrengthAxis& axis : axes_) {
+      : without_(without) {
+    const auto terms = static_cast<Eigen::Index>(2 * axes.size());
+    expects(!axes.empty() && axes.size() <= 3, "StrengthProfile: components", "1 .. 3", axes.size());
+    expects(answer.size() == terms && square.rows() == terms && square.cols() == terms, "StrengthProfile: terms",
+            "two for each component", answer.size());
+    for (const StrengthAxis& axis : axes) {
       expects(axis.law.scale > 0, "StrengthProfile: scale", "> 0", axis.law.scale);
+      expects(axis.law.growth > 0, "StrengthProfile: growth", "> 0", axis.law.growth);
       expects(axis.range.first <= axis.range.second, "StrengthProfile: range", "the lower end first", axis.range.first);
+      range_.push_back(axis.range);
     }
-    best_ = lowest_with(axes_.size(), 0);
+    pours_.push_back({std::move(axes), std::move(answer), std::move(square)});
+    best_ = lowest_with(range_.size(), 0);
   }
 
-  std::size_t components() const noexcept { return axes_.size(); }
-  const StrengthAxis& axis(std::size_t component) const { return axes_.at(component); }
+  std::size_t components() const noexcept { return range_.size(); }
+  /// Which values of a component are asked about, the lower first.
+  const std::pair<double, double>& range(std::size_t component) const { return range_.at(component); }
 
   double operator()(const Strength& strength) const {
-    const Eigen::VectorXd phi = detail::strength_terms(axes_, strength);
-    return without_ - 2 * answer_.dot(phi) + phi.dot(square_ * phi);
+    double sum = without_;
+    for (const Pour& pour : pours_) {
+      const Eigen::VectorXd phi = detail::strength_terms(pour.axes, strength);
+      sum += phi.dot(pour.square * phi) - 2 * pour.answer.dot(phi);
+    }
+    return sum;
   }
 
   /// Distance where the effect is as the model has it.
@@ -113,29 +121,34 @@ class StrengthProfile {
       }
       return inside;
     };
-    return {end(axes_.at(component).range.first), end(axes_.at(component).range.second)};
+    return {end(range_.at(component).first), end(range_.at(component).second)};
   }
 
   /// With another pour's; throws std::invalid_argument if it is about other strengths.
   StrengthProfile& operator+=(const StrengthProfile& other) {
-    expects(other.axes_ == axes_, "StrengthProfile: laws and ranges of what is added", "the same", "others");
+    expects(other.range_ == range_, "StrengthProfile: ranges of what is added", "the same", "others");
     without_ += other.without_;
-    answer_ += other.answer_;
-    square_ += other.square_;
-    best_ = lowest_with(axes_.size(), 0);
+    pours_.insert(pours_.end(), other.pours_.begin(), other.pours_.end());
+    best_ = lowest_with(range_.size(), 0);
     return *this;
   }
 
  private:
   static constexpr int fine_steps = 50;
 
+  struct Pour {
+    std::vector<StrengthAxis> axes;
+    Eigen::VectorXd answer;
+    Eigen::MatrixXd square;
+  };
+
   /// The smallest distance where one component has a value; of all, where there is no such component. Looks on a grid,
   /// then around the best of it in smaller and smaller steps: distances are smooth, but may have several valleys.
   Strength lowest_with(std::size_t held, double value) const {
-    const int steps = axes_.size() == 1 ? 40 : 12;
-    Strength best(static_cast<Eigen::Index>(axes_.size()));
-    for (std::size_t k = 0; k < axes_.size(); ++k) {
-      best[static_cast<Eigen::Index>(k)] = k == held ? value : axes_[k].range.first;
+    const int steps = range_.size() == 1 ? 40 : 12;
+    Strength best(static_cast<Eigen::Index>(range_.size()));
+    for (std::size_t k = 0; k < range_.size(); ++k) {
+      best[static_cast<Eigen::Index>(k)] = k == held ? value : range_[k].first;
     }
     double lowest = (*this)(best);
     const auto look = [&](const Strength& strength) {
@@ -147,11 +160,11 @@ class StrengthProfile {
     };
     Strength place = best;
     const auto visit = [&](const auto& self, std::size_t k) -> void {
-      if (k == axes_.size()) {
+      if (k == range_.size()) {
         look(place);
         return;
       }
-      const auto [low, high] = axes_[k].range;
+      const auto [low, high] = range_[k];
       const int count = k == held || high == low ? 0 : steps;
       for (int step = 0; step <= count; ++step) {
         place[static_cast<Eigen::Index>(k)] = k == held       ? value
@@ -165,10 +178,10 @@ class StrengthProfile {
     for (double share = 1.0 / steps; share > 1e-6; share *= 0.5) {
       for (bool moved = true; moved;) {
         const double before = lowest;
-        for (std::size_t k = 0; k < axes_.size(); ++k) {
+        for (std::size_t k = 0; k < range_.size(); ++k) {
           if (k != held) {
             const auto index = static_cast<Eigen::Index>(k);
-            const auto [low, high] = axes_[k].range;
+            const auto [low, high] = range_[k];
             for (const double way : {-share, share}) {
               Strength next = best;
               next[index] = std::clamp(best[index] + way * (high - low), low, high);
@@ -182,10 +195,9 @@ class StrengthProfile {
     return best;
   }
 
-  std::vector<StrengthAxis> axes_;
+  std::vector<std::pair<double, double>> range_{};  ///< by component
   double without_;
-  Eigen::VectorXd answer_;
-  Eigen::MatrixXd square_;
+  std::vector<Pour> pours_{};
   Strength best_{};
 };
 
