@@ -82,7 +82,7 @@ class EffectExperiment {
   std::size_t frames(const EffectCase& of, std::size_t which) const {
     const double seconds =
         std::min(effect_scenarios().at(of.scenario).pours.at(which).duration, options_.recording.longest);
-    return static_cast<std::size_t>(std::max(1L, std::lround(seconds * EffectRecordingSettings::frames_per_second)));
+    return static_cast<std::size_t>(std::max(1L, std::lround(seconds * options_.recording.frames_per_second)));
   }
 
   ExperimentRecording recording_of(const EffectCase& of, std::size_t which) const {

@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include <decant/boundary/cavity.hpp>
 #include <decant/camera/distorted_pinhole_camera.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
@@ -122,7 +123,7 @@ struct TrackingParts : decant::DefaultParts<float> {
 using TrackingModel = decant::Simulator<TrackingParts>;
 
 /// The initial amount of liquid that a recording says, times a factor, at most a full container. Throws
-/// std::invalid_argument if the recording does not know it.
+/// std::invalid_argument if the recording does not know it, or says more than the container holds.
 template <class Model>
 void fill_as_recorded(const decant::Recording& recording, double factor, Model& model) {
   if (!recording.liquid.initial) {
@@ -131,10 +132,16 @@ void fill_as_recorded(const decant::Recording& recording, double factor, Model& 
   using decant::FillAmount;
   const auto& initial = *recording.liquid.initial;
   decant::expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
-  const FillAmount amount = initial.fill_fraction ? FillAmount::fraction(std::min(factor * *initial.fill_fraction, 1.0))
-                                                  : FillAmount::volume(factor * *initial.volume);
+  const auto body = static_cast<decant::BodyId>(initial.body);
+  FillAmount amount = initial.fill_fraction ? FillAmount::fraction(std::min(factor * *initial.fill_fraction, 1.0))
+                                            : FillAmount::volume(factor * *initial.volume);
+  if (!initial.fill_fraction && factor > 1) {
+    const auto& container = model.bodies()[body];
+    const decant::Vector3<double> up = -(container.motion.at(model.time()).rotation.conjugate() * recording.gravity);
+    amount.value = std::min(amount.value, std::max(*initial.volume, decant::Cavity(container.surface, up).volume()));
+  }
   if (amount.value > 0) {
-    decant::fill(model, static_cast<decant::BodyId>(initial.body), amount);
+    decant::fill(model, body, amount);
   }
 }
 
