@@ -2,10 +2,9 @@
 // A simulation does not go as two recorded pours do. Where do they differ, which effect does the model lack, how strong
 // is it, does the other pour agree, and how well does the model predict that one when it has it?
 
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
-#include <string>
-#include <utility>
 
 #include <decant/discovery/missing_effect.hpp>
 #include <decant/discovery/silhouette_gap.hpp>

@@ -162,10 +162,22 @@ TEST_CASE("strength profile: an interval holds what is hardly worse, and pours a
   CHECK(profile.within(0, 100 * unit) == std::pair(0.0, 4.0));
 
   StrengthProfile both = profile;
-  both += other.profile(seen(2.5 * other_way));  // which has laws of its own
+  both += other.profile(seen(2.5 * other_way));
   const double other_unit = space.distance(seen(other_way));
   CHECK(both.best()[0] == Approx((1.5 * unit + 2.5 * other_unit) / (unit + other_unit)).epsilon(1e-4));
   CHECK(both.without() == Approx(2.25 * unit + 6.25 * other_unit));
+  // each with a law of its own
+  MatrixXd slow(curve_features, 2), fast(curve_features, 2);
+  slow << 0.5 * way, 4 * way;
+  fast << 3 * way, 4 * way;
+  const StrengthProfile late = curve_of(space, {1.4, 4}, slow).profile(seen(way));
+  const StrengthProfile early = curve_of(space, {1.4, 4}, fast).profile(seen(2 * way));
+  StrengthProfile sum = late;
+  sum += early;
+  for (const double strength : {0.7, 1.4, 3.0}) {
+    CHECK(late(one(strength)) != Approx(curve_of(space, {1.4, 4}, fast).profile(seen(way))(one(strength))));
+    CHECK(sum(one(strength)) == Approx(late(one(strength)) + early(one(strength))));
+  }
   CHECK_THROWS_WITH(both += curve_of(space, {5}, way).profile(seen(way)), decant_test::contains("the same"));
 }
 

@@ -22,7 +22,7 @@ TEST_CASE("tracking run: more than a container holds is a full one, by volume as
   mug.motion = decant::PoseTrack();
   recording.bodies = {mug};
   TrackingOptions options;
-  options.spacing = 0.013;
+  options.spacing = 0.013;  // 2.2 ml each, so amounts are within a few particles
   const auto millilitres = [&](std::optional<double> fraction, std::optional<double> volume, double factor) {
     recording.liquid.initial = decant::recording::Initial{0, fraction, volume};
     options.initial_amount_factor = factor;
