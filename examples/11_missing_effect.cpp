@@ -55,8 +55,8 @@ int main(int count, char** values) {
 
   // the mended model; a Tracker takes it from here as well
   const ModelRun mended{{found.applied()}, 1};
-  const double before = overlap_gap(other.seen, other.model.predict({{}, 1}));
-  const double after = overlap_gap(other.seen, other.model.predict(mended));
+  const double before = overlap_gap(other.seen.silhouettes, other.model.predict({{}, 1}).silhouettes);
+  const double after = overlap_gap(other.seen.silhouettes, other.model.predict(mended).silhouettes);
   const example::EffectModel simulator = other.model.started(mended);
   std::printf("Its silhouettes overlap by %.0f %% without, and %.0f %% with it (%d particles).\n", 100 * (1 - before),
               100 * (1 - after), static_cast<int>(simulator.fluid().size()));

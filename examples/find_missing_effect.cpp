@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -37,12 +38,30 @@ namespace {
 
 using Interactions = std::vector<decant::Interaction<example::RecordedModel>>;
 
+/// Throws std::runtime_error for what is no name with a number that is not negative.
+std::map<std::string, double> numbers_by_name(const std::string& option, const std::vector<std::string>& texts,
+                                              const std::string& example) {
+  std::map<std::string, double> result;
+  for (const std::string& each : texts) {
+    const std::size_t sign = each.find('=');
+    const std::string number = sign == std::string::npos ? "" : each.substr(sign + 1);
+    double value = -1;
+    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
+    if (error != std::errc() || end != number.data() + number.size() || !(value >= 0) || !std::isfinite(value)) {
+      throw std::runtime_error(option + ": expected a name and a number that is not negative, such as " + example +
+                               ", not " + each);
+    }
+    result[each.substr(0, sign)] = value;
+  }
+  return result;
+}
+
 }  // namespace
 
 int main(int count, char** values) {
   const example::SweepSession session;
   std::string json_file, report_file, journal_file;
-  std::vector<std::string> learn_folders, held_out_folders, reference_folders, tolerances;
+  std::vector<std::string> learn_folders, held_out_folders, reference_folders, tolerances, reading_errors;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double spacing_mm = 1e3 * options.model.spacing;
@@ -62,6 +81,10 @@ int main(int count, char** values) {
          "how far off the model may be and nothing is missing, such as latency=0.004 or body_pose=0.001, in the "
          "effect's unit; several by commas")
       ->delimiter(',');
+  app.add_option("--reading-error", reading_errors,
+                 "standard deviations of what sensors read, a model of particles included, such as target_mass_g=2 or "
+                 "level_mm=3, in the channel's unit; several by commas")
+      ->delimiter(',');
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--draws", settings.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
@@ -73,17 +96,8 @@ int main(int count, char** values) {
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
     example::expect_apart(learn_folders, held_out_folders, reference_folders);
     options.model.spacing = 1e-3 * spacing_mm;
-    for (const std::string& each : tolerances) {
-      const std::size_t sign = each.find('=');
-      const std::string number = sign == std::string::npos ? "" : each.substr(sign + 1);
-      double value = -1;
-      const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
-      if (error != std::errc() || end != number.data() + number.size() || !(value >= 0) || !std::isfinite(value)) {
-        throw std::runtime_error(
-            "--tolerance: expected a name and a number that is not negative, such as latency=0.004, not " + each);
-      }
-      options.tolerances[each.substr(0, sign)] = value;
-    }
+    options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
+    options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
     const auto read = [&](const std::vector<std::string>& folders) {
       Interactions interactions;
@@ -127,6 +141,13 @@ int main(int count, char** values) {
                 example::references_sentence(reference_folders.size(), result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
                 example::candidates_table(result.judged, result).text().c_str());
+    std::vector<std::vector<std::string>> sensors;
+    for (const auto& each : kept) {
+      sensors.push_back(each->sensors());
+    }
+    if (std::any_of(sensors.begin(), sensors.end(), [](const auto& each) { return !each.empty(); })) {
+      std::printf("%s", example::where_read_table(learn_folders, sensors, result).text().c_str());
+    }
     if (result.verdict == decant::Verdict::Nothing) {
       std::printf("What would have been seen in about nine of ten such recordings:\n%s",
                   example::smallest_seen_table(result.judged, result).text().c_str());

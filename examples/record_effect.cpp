@@ -47,6 +47,7 @@ int main(int count, char** values) {
   app.add_option("--pour", pours, "a, b or both")->check(CLI::IsMember({"a", "b", "both"}));
   app.add_flag("--without-effect", without, "the same errors and noise, but nothing is hidden");
   app.add_flag("--truth-masks", settings.truth_masks, "writes clean silhouettes, too");
+  app.add_flag("--scale", settings.scale, "weighs what is in the pan, too");
   app.add_option("--solver", settings.solver, "of the reality: divergence_free, as models have it, or position_based")
       ->transform(CLI::CheckedTransformer(example::reality_solvers()));
   app.add_option("--spacing-mm", spacing_mm, "of the reality's particles")->check(CLI::Range(1.0, 20.0));

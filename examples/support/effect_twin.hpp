@@ -75,6 +75,7 @@ struct EffectRecordingSettings {
   bool with_effect = true;   ///< false: the same errors and noise, but nothing is hidden
   bool truth_masks = false;  ///< clean silhouettes beside the recording
   double frames_per_second = 30;
+  bool scale = false;  ///< weighs what is in the pan, with noise of 1 g
 };
 
 /// All effects are there, and cost nothing where they are zero.
@@ -493,6 +494,11 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   MaskNoise noise(noise_seed);
   std::mt19937 drops(noise_seed);
 
+  recording::Measurements weighed;
+  weighed.channels.push_back({"target_mass_g", recording::Quantity::TargetMass});
+  std::mt19937 tremble(noise_seed + 1);
+  std::normal_distribution<double> grams(0, 1);
+
   nlohmann::json container_ml = nlohmann::json::array(), pan_ml = nlohmann::json::array();
   const double seconds = std::min(plan.duration, settings.longest);
   const int frames = std::max(1, static_cast<int>(std::lround(seconds * settings.frames_per_second)));
@@ -501,6 +507,9 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
     const StepReport report = reality.advance(time);
     container_ml.push_back(1e6 * report.contents[0].volume);
     pan_ml.push_back(1e6 * report.contents[1].volume);
+    weighed.times.push_back(time);
+    weighed.channels.front().values.push_back(header.liquid.density * report.contents[1].volume +
+                                              1e-3 * grams(tremble));
     Mask seen = sight.look(reality.model());
     if (plain && !first_sight.found()) {
       plain->advance(time);
@@ -531,6 +540,9 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   }
   truth["volume_ml"] = {{plan.container, container_ml}, {"pan", pan_ml}};
   writer.set_truth(truth.dump());
+  if (settings.scale) {
+    writer.set_measurements(std::move(weighed));
+  }
   writer.finish();
 }
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -168,15 +169,17 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
 /// What the answer owes to references.
 inline std::string references_sentence(std::size_t references, const decant::MissingEffect& result) {
   if (references == 0) {
-    return "There are no references: how far reality is from the model where nothing is missing is not known, and taken "
+    return "There are no references: how far reality is from the model where nothing is missing is not known, and "
+           "taken "
            "to be little more than how far its own runs are from each other.";
   }
   const std::string count = std::to_string(references) + (references == 1 ? " reference" : " references");
   return result.taught_by > 0
              ? std::to_string(result.taught_by) + " of " + count +
                    " look like the recordings: what they are off from the model by was taken off first."
-             : count + ": how far they are from the model is no gap. None looks enough like the recordings to take off "
-                       "what it is off by.";
+             : count +
+                   ": how far they are from the model is no gap. None looks enough like the recordings to take off "
+                   "what it is off by.";
 }
 
 /// @param gravity of the recordings [m/s^2].
@@ -233,11 +236,17 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
       }
     }
   }
+  double first_read = std::numeric_limits<double>::infinity();
+  for (const auto& recording : result.where_read) {
+    for (const decant::ReadingDisagreement& each : recording) {
+      first_read = std::min(first_read, each.begin);
+    }
+  }
   const decant::RefinedEffect* timed =
       !result.found.empty() && result.found.front().window ? &result.found.front() : nullptr;
   json["onset_s"] = timed != nullptr      ? number_json(timed->window->from)
-                    : earliest != nullptr ? nlohmann::json(earliest->begin)
-                                          : nlohmann::json();
+                    : earliest != nullptr ? nlohmann::json(std::min(earliest->begin, first_read))
+                                          : number_json(first_read);
   json["onset_px"] = earliest != nullptr ? nlohmann::json({earliest->onset_u, earliest->onset_v}) : nlohmann::json();
   json["gap"] = {{"before", number_json(result.learn.before)},
                  {"after", number_json(result.learn.after)},
@@ -320,6 +329,23 @@ inline decant::Table gap_table(const decant::MissingEffect& result) {
   };
   add("learnt from", result.learn);
   add("held out", result.held_out);
+  return table;
+}
+
+/// What sensors read too much or too little of, the heaviest first.
+/// @param sensors their names, by recording.
+inline decant::Table where_read_table(const std::vector<std::string>& recordings,
+                                      const std::vector<std::vector<std::string>>& sensors,
+                                      const decant::MissingEffect& result) {
+  using decant::detail::fixed_text;
+  decant::Table table({"recording", "sensor", "reads", "from [s]", "to [s]", "largest, in what chance does"});
+  for (std::size_t which = 0; which < result.where_read.size(); ++which) {
+    for (std::size_t k = 0; k < std::min<std::size_t>(8, result.where_read[which].size()); ++k) {
+      const decant::ReadingDisagreement& each = result.where_read[which][k];
+      table.add({recordings.at(which), sensors.at(which).at(each.sensor), each.more ? "too much" : "too little",
+                 fixed_text(each.begin, 2), fixed_text(each.end, 2), fixed_text(each.largest, 1)});
+    }
+  }
   return table;
 }
 

@@ -29,12 +29,14 @@ struct ModelView {
   decant::OverlapScore overlap{};
   std::vector<double> iou{};                  ///< by frame that is compared; NaN where nothing was seen
   std::vector<std::vector<double>> volume{};  ///< by body and frame [ml]; empty for bodies that hold nothing
+  std::vector<std::vector<double>> read{};    ///< by sensor and frame
   std::vector<Overlay> overlays{};            ///< by frame
 };
 
 inline ModelView view_of_run(const RecordedInteraction& of, const decant::ModelRun& run) {
   ModelView view;
   view.volume.resize(of.recording.bodies.size());
+  view.read.resize(of.seen.readings.size());
   const auto seen = detail::believed_masks(of.recording, 0, of.frames);
   of.model.watch(run, [&](std::size_t frame, EffectModel& model, std::span<const decant::Mask> predicted) {
     const decant::Mask* mask = seen[frame] ? &*seen[frame] : nullptr;
@@ -45,6 +47,9 @@ inline ModelView view_of_run(const RecordedInteraction& of, const decant::ModelR
     Overlay overlay = overlay_of(predicted.front(), mask);
     overlay.counts = mask != nullptr && overlap.union_px() >= decant::OverlapScoreSettings{}.least_union_px;
     view.overlays.push_back(std::move(overlay));
+    for (std::size_t sensor = 0; sensor < view.read.size(); ++sensor) {
+      view.read[sensor].push_back(of.model.scene().sensors[sensor].read(model));
+    }
     for (const auto& contained : model.step(0).contents) {
       view.volume[contained.body].push_back(1e6 * contained.volume);
     }
@@ -116,6 +121,19 @@ inline decant::BarChart candidates_chart(const Effects& effects, const decant::M
   return chart;
 }
 
+/// What a sensor read, and what the models read of the first recording.
+inline decant::LineChart sensor_chart(const RecordedInteraction& first, std::size_t sensor,
+                                      const std::vector<double>& times, const std::vector<ComparedModel>& models) {
+  decant::LineChart chart{"Read by a sensor", "time [s]", first.seen.readings[sensor].name() + ", in SI units", {}};
+  chart.lines.push_back({"recorded", times, first.seen.readings[sensor].values()});
+  for (const ComparedModel& model : models) {
+    const std::vector<double>& read = model.views.front().read[sensor];
+    chart.lines.push_back(
+        {model.name, {times.begin(), times.begin() + static_cast<std::ptrdiff_t>(read.size())}, read});
+  }
+  return chart;
+}
+
 /// Films and charts of the first recording.
 inline void add_first_recording(decant::HtmlReport& report, const RecordedInteraction& first,
                                 const std::vector<ComparedModel>& models) {
@@ -151,6 +169,9 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
                  chosen);
     report.chart(overlap);
     report.chart(contents);
+    for (std::size_t sensor = 0; sensor < first.seen.readings.size(); ++sensor) {
+      report.chart(sensor_chart(first, sensor, times, models));
+    }
     add_chosen_frames(report, overlays, sources, chosen);
   }
 }
@@ -202,6 +223,13 @@ inline void write_missing_effect_report(const std::string& file,
     report.table(where_table(names, result));
   } else {
     report.paragraph("Nowhere in particular: no part of the picture is off by much.");
+  }
+  std::vector<std::vector<std::string>> sensors;
+  for (std::size_t k = 0; k < learnt; ++k) {
+    sensors.push_back(interactions[k]->sensors());
+  }
+  if (std::any_of(result.where_read.begin(), result.where_read.end(), [](const auto& each) { return !each.empty(); })) {
+    report.table(where_read_table(names, sensors, result));
   }
   report.heading("Candidates");
   report.table(candidates_table(effects, result));

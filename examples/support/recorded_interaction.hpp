@@ -33,6 +33,8 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/simulator.hpp>
 
+#include "pour_places.hpp"
+#include "recorded_sensors.hpp"
 #include "tracking_run.hpp"
 
 namespace example {
@@ -44,6 +46,7 @@ struct InteractionOptions {
   double frames_per_second = 15;  ///< of those of the recording that are compared
   decant::SimulatedInteractionSettings model{};
   std::map<std::string, double> tolerances{};  ///< by effect: of each of its components, in place of the catalogue's
+  std::map<std::string, double> reading_errors{};  ///< see recorded_sensors
 };
 
 namespace detail {
@@ -91,6 +94,9 @@ inline std::string fingerprint(const decant::Recording& recording, const Recorde
   }
   number(model.settings().spacing);
   number(model.settings().jitter);
+  for (const auto& sensor : model.scene().sensors) {
+    add(sensor.name);
+  }
   for (const decant::Discretisation& each : model.settings().discretisations) {
     for (const double factor : {each.spacing, each.support, each.precision, each.drawing}) {
       number(factor);
@@ -159,109 +165,6 @@ inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std:
     }
   }
   return series;
-}
-
-/// A container's inside, in its own frame.
-struct Inside {
-  decant::Vector3<double> up = decant::Vector3<double>::UnitZ();     ///< out of its opening
-  decant::Vector3<double> middle = decant::Vector3<double>::Zero();  ///< of the body's box [m]
-  decant::Vector3<double> floor = decant::Vector3<double>::Zero();   ///< the lowest place inside, below the middle [m]
-  double volume = 0;                                                 ///< [m^3]
-  double rim = 0;                                                    ///< height along `up` [m]
-  double rim_area = 0, widest_area = 0;                              ///< of level sections [m^2]
-
-  double rim_radius() const { return std::sqrt(rim_area / std::numbers::pi); }
-  /// Air gets in past the liquid only with difficulty.
-  bool has_neck() const { return rim_area < 0.45 * widest_area; }
-  decant::Vector3<double> mouth() const { return middle + (rim - middle.dot(up)) * up; }
-};
-
-/// A body's inside as it holds most: with one of its own axes upright, as it is made, or as it stands at first.
-/// Recordings may begin with a container that is tilted already. Nothing if it holds nothing.
-inline std::optional<Inside> inside_of(const decant::recording::Body& body,
-                                       const decant::Vector3<double>& up_at_first) {
-  using namespace decant;
-  const auto surface = std::make_shared<const BoundingVolumeHierarchy>(body.mesh);
-  std::optional<Inside> best;
-  for (const Vector3<double>& up :
-       {Vector3<double>(0, 0, 1), Vector3<double>(0, 1, 0), Vector3<double>(1, 0, 0), Vector3<double>(0, 0, -1),
-        Vector3<double>(0, -1, 0), Vector3<double>(-1, 0, 0), up_at_first}) {
-    const Cavity cavity(surface, up);
-    // a little more by chance is no reason to take another axis
-    if (cavity.empty() || (best && cavity.volume() <= 1.02 * best->volume)) {
-      continue;
-    }
-    Inside& inside = best.emplace();
-    inside.up = up;
-    inside.volume = cavity.volume();
-    inside.middle = surface->bounds().center();
-    inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(up)) * up;
-    inside.rim = cavity.rim_height();
-    constexpr int slices = 20;
-    const double thick = (inside.rim - cavity.bottom_height()) / slices;
-    for (int k = 0; k < slices && thick > 0; ++k) {
-      const double top = inside.rim - k * thick;
-      const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
-      inside.rim_area = k == 0 ? area : inside.rim_area;
-      inside.widest_area = std::max(inside.widest_area, area);
-    }
-  }
-  return best;
-}
-
-/// The point of a container's rim that gets lowest, in its own frame and in the world as it then is.
-inline std::pair<decant::Vector3<double>, decant::Vector3<double>> lip_of(const decant::recording::Body& body,
-                                                                          const Inside& inside,
-                                                                          const decant::Vector3<double>& up) {
-  using namespace decant;
-  double steepest = 2;
-  Pose tilted{};
-  for (const PoseTrack::Sample& sample : body.motion.samples()) {
-    const double upright = up.dot(sample.pose.rotation * inside.up);
-    if (upright < steepest) {
-      steepest = upright;
-      tilted = sample.pose;
-    }
-  }
-  double lowest = 1e300;
-  Vector3<double> lip = inside.mouth();
-  for (const auto& vertex : body.mesh.vertices) {
-    if (inside.up.dot(vertex) > inside.rim - 0.01 && up.dot(tilted * vertex) < lowest) {
-      lowest = up.dot(tilted * vertex);
-      lip = vertex;
-    }
-  }
-  return {lip, tilted * lip};
-}
-
-/// The containers of a pour, and about where it goes.
-struct PourPlaces {
-  std::vector<std::optional<Inside>> inside{};                    ///< by body
-  decant::Vector3<double> lip = decant::Vector3<double>::Zero();  ///< of the first source, in its frame [m]
-  decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way from there to the target [m]
-};
-
-inline PourPlaces pour_places(const decant::Recording& recording) {
-  using namespace decant;
-  const Vector3<double> up = -recording.gravity.normalized();
-  const double begin = recording.timestamps.front();
-  PourPlaces places;
-  std::optional<Vector3<double>> lip, target;
-  for (const recording::Body& body : recording.bodies) {
-    const Pose first = body.motion.at(begin);
-    places.inside.push_back(inside_of(body, first.rotation.conjugate() * up));
-    const std::optional<Inside>& inside = places.inside.back();
-    if (body.role == recording::Role::Source && !lip && inside) {
-      std::tie(places.lip, lip.emplace()) = lip_of(body, *inside, up);
-    }
-    if (body.role == recording::Role::Target && !target) {
-      target = first * BoundingVolumeHierarchy(body.mesh).bounds().center();
-    }
-  }
-  places.jet = lip && target ? Vector3<double>(0.5 * (*lip + *target))
-               : lip         ? *lip
-                             : target.value_or(Vector3<double>::Zero());
-  return places;
 }
 
 /// The catalogue, as far as it applies to a recording.
@@ -358,8 +261,17 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
 struct RecordedInteraction {
   decant::Recording recording;
   RecordedModel model;
-  std::vector<std::size_t> frames;             ///< of the recording, that are compared
-  std::vector<decant::SilhouetteSeries> seen;  ///< by camera
+  std::vector<std::size_t> frames;  ///< of the recording, that are compared
+  decant::Observation seen;
+
+  /// Their names.
+  std::vector<std::string> sensors() const {
+    std::vector<std::string> names;
+    for (const decant::ReadingSeries& each : seen.readings) {
+      names.push_back(each.name());
+    }
+    return names;
+  }
 
   /// @param name by which messages and journals know it.
   decant::Interaction<RecordedModel> interaction(std::string name) const {
@@ -382,8 +294,9 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
   for (const recording::Body& body : recording.bodies) {
     scene.motion.push_back(body.motion);
   }
-  std::vector<SilhouetteSeries> seen;
-  const Vector3<double> middle = detail::pour_places(recording).jet;
+  Observation seen;
+  const detail::PourPlaces places = detail::pour_places(recording);
+  const Vector3<double> middle = places.jet;
   for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
     const recording::Camera& of = recording.cameras[camera];
     InteractionCamera<DistortedPinholeCamera> one{camera_of(of.view(0), recording.width, recording.height), {}};
@@ -393,8 +306,10 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
       one.camera_from_world.push_back(of.view(frame).camera_from_world);
     }
     scene.cameras.push_back(std::move(one));
-    seen.push_back(detail::seen_by(recording, camera, frames, options.model.cell_px));
+    seen.silhouettes.push_back(detail::seen_by(recording, camera, frames, options.model.cell_px));
   }
+  std::tie(scene.sensors, seen.readings) =
+      recorded_sensors<EffectModel>(recording, scene.times, places, options.reading_errors);
   auto start_of = std::make_shared<Recording>(recording);
   start_of->liquid.surface_tension = 0;
   scene.start = [start_of](const SimulatorSettings& solver, double fill) {

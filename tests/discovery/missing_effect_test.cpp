@@ -269,6 +269,7 @@ TEST_CASE("missing effect: the more effects, the less they may leave, and one th
   CHECK(usual.verdict == Verdict::Unexplained);
   MissingEffectSettings settings;
   settings.least_share = 0.5;  // so two may leave a quarter
+  settings.most_left = 100;    // a gust is far more than what chance does
   const MissingEffect two = found_in(gust, 71, settings);
   CHECK(two.verdict == Verdict::Named);
   REQUIRE(two.found.size() == 2);
@@ -284,6 +285,7 @@ TEST_CASE("missing effect: what explains enough alone stands where a second one 
   MissingEffectSettings settings;
   settings.least_share = 0.54;  // two would have to explain 0.77; they explain 0.55 and 0.76 of a gust
   settings.least_share_to_chance = 1;
+  settings.most_left = 100;
   const MissingEffect result = found_in({0, 0, 1, 0, 4}, 75, settings);
   CHECK(result.verdict == Verdict::Named);
   REQUIRE(result.found.size() == 1);

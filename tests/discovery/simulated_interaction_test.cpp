@@ -146,15 +146,15 @@ double apart(const SilhouetteSeries& a, const SilhouetteSeries& b, Index columns
 
 TEST_CASE("simulated interaction: a run is what its seed and its effects make of it") {
   const Pour pour = pour_of();
-  const auto once = pour.predict({{}, 1, false}), again = pour.predict({{}, 1, false});
+  const auto once = pour.predict({{}, 1, false}).silhouettes, again = pour.predict({{}, 1, false}).silhouettes;
   REQUIRE(once.size() == 1);
   CHECK(once[0].frames() == 7);
   CHECK(once[0].numbers() == again[0].numbers());
   CHECK(wet_area(once[0]) > 20);
-  CHECK(apart(once[0], pour.predict({{}, 2, false})[0]) > 1);
+  CHECK(apart(once[0], pour.predict({{}, 2, false}).silhouettes[0]) > 1);
   // without any shaking seeds make no difference
   const Pour calm = pour_of(pour_scene(), 0);
-  CHECK(calm.predict({{}, 1, false})[0].numbers() == calm.predict({{}, 2, false})[0].numbers());
+  CHECK(calm.predict({{}, 1, false}).silhouettes[0].numbers() == calm.predict({{}, 2, false}).silhouettes[0].numbers());
   // liquid has arrived in the pan
   PourModel model = pour.started({{}, 1, false});
   const float most = 0.04F;
@@ -166,9 +166,9 @@ TEST_CASE("simulated interaction: a run is what its seed and its effects make of
 TEST_CASE("simulated interaction: poses that are late or off are the motion that they tell of") {
   // recorded late by a tenth of a second: what is recorded for 0.1 s later is so now
   const Pour late = pour_of(pour_scene(Vector3<double>::Zero(), 0.1), 0), in_time = pour_of(pour_scene(), 0);
-  const auto seen = late.predict(run_with(late, "latency", {0.1}));
-  CHECK(apart(seen[0], in_time.predict({{}, 1, false})[0]) < 1e-6 + 0.02 * wet_area(seen[0]));
-  CHECK(apart(seen[0], late.predict({{}, 1, false})[0]) > 0.2 * wet_area(seen[0]));
+  const auto seen = late.predict(run_with(late, "latency", {0.1})).silhouettes;
+  CHECK(apart(seen[0], in_time.predict({{}, 1, false}).silhouettes[0]) < 1e-6 + 0.02 * wet_area(seen[0]));
+  CHECK(apart(seen[0], late.predict({{}, 1, false}).silhouettes[0]) > 0.2 * wet_area(seen[0]));
 
   // the cup alone, then the pan alone, with the liquid of the cup going along
   const Vector3<double> off(0.02, 0, 0);
@@ -185,16 +185,16 @@ TEST_CASE("simulated interaction: poses that are late or off are the motion that
 
 TEST_CASE("simulated interaction: errors of a camera change its picture alone") {
   const Pour pour = pour_of(pour_scene(), 0);
-  const auto plain = pour.predict({{}, 1, false});
+  const auto plain = pour.predict({{}, 1, false}).silhouettes;
   // ten pixels are one cell
-  const auto shifted = pour.predict(run_with(pour, "camera_shift", {10, 0}));
+  const auto shifted = pour.predict(run_with(pour, "camera_shift", {10, 0})).silhouettes;
   CHECK(apart(plain[0], shifted[0], 1) < 0.1 * apart(plain[0], shifted[0]));
-  const auto lower = pour.predict(run_with(pour, "camera_shift", {0, 10}));
+  const auto lower = pour.predict(run_with(pour, "camera_shift", {0, 10})).silhouettes;
   CHECK(mean_row(lower[0]) - mean_row(plain[0]) == Approx(1).epsilon(0.1));  // v points down
-  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {2}))[0]) > 1.1 * wet_area(plain[0]));
-  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {-2}))[0]) < 0.95 * wet_area(plain[0]));
+  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {2})).silhouettes[0]) > 1.1 * wet_area(plain[0]));
+  CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {-2})).silhouettes[0]) < 0.95 * wet_area(plain[0]));
   // a turn of the picture about its middle by a quarter takes what is above it to the right
-  const auto turned = pour.predict(run_with(pour, "camera_roll", {1.5707963}));
+  const auto turned = pour.predict(run_with(pour, "camera_roll", {1.5707963})).silhouettes;
   CHECK(apart(plain[0], turned[0]) > wet_area(plain[0]));
 }
 
@@ -281,9 +281,9 @@ TEST_CASE("simulated interaction: what acts for a while acts then, on the record
   SimulatedInteractionSettings settings;
   settings.spacing = 0.009;
   const Pour pour(scene, effects, settings);
-  const auto plain = pour.predict({{}, 1, false});
+  const auto plain = pour.predict({{}, 1, false}).silhouettes;
   const auto frames_that_differ = [&](const ModelRun& run) {
-    const auto seen = pour.predict(run);
+    const auto seen = pour.predict(run).silhouettes;
     std::vector<std::size_t> frames;
     for (std::size_t frame = 0; frame < seen[0].frames(); ++frame) {
       bool same = true;
@@ -332,7 +332,7 @@ TEST_CASE("simulated interaction: obstacles go with their body, and necks hold l
     CHECK((cup * Vector3<double>(0.01, 0, 0.06) - with_it * Vector3<double>(0.01, 0, 0.06)).norm() < 1e-12);
   }
   block.effects[0].place = Vector3<double>(0, 0, 0.065);
-  CHECK(apart(pour.predict(block)[0], pour.predict({{}, 1, false})[0]) > 5);
+  CHECK(apart(pour.predict(block).silhouettes[0], pour.predict({{}, 1, false}).silhouettes[0]) > 5);
   CHECK(pour.started(run_with(pour, "obstacle", {1e-4})).bodies().size() == 2);  // no particle would feel it
 
   const auto left_in_cup = [&](const ModelRun& run) {
@@ -427,6 +427,69 @@ TEST_CASE("simulated interaction: what is seen somewhere has its place there, as
   }
 }
 
+TEST_CASE("simulated interaction: liquid that leaks goes on outside of the wall, wherever the hole is looked for") {
+  const Pour pour = pour_of();
+  ModelRun run = run_with(pour, "leak", {30});
+  for (const double height : {0.001, 0.012, 0.018, 0.024}) {  // the exit is 2 cm below 4 mm, the floor 3 mm thick
+    run.effects[0].place = Vector3<double>(0.008, 0, height);
+    PourModel model = pour.started(run);
+    double drained = 0;
+    for (int frame = 0; frame < 4; ++frame) {
+      const StepReport report = model.step(0.025);
+      REQUIRE(report.advanced());
+      drained = report.drained;
+    }
+    CHECK(drained > 1e-6);
+  }
+}
+
+TEST_CASE("simulated interaction: a run with an effect that cannot be as it is asked for has failed, and no more") {
+  auto effects = pour_catalogue();
+  InteractionEffect<PourModel> hole = leak_effect<PourModel>(0, {0, 0, 0.004}, {0, 0, -0.0055}, "into the floor");
+  hole.name = "bad";
+  effects.push_back(hole);
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  const ModelRun run = run_with(pour, "bad", {30});
+  CHECK(pour.predict(run).empty());
+  CHECK_THROWS_WITH(pour.started(run), decant_test::contains("exit"));
+}
+
+TEST_CASE("simulated interaction: sensors read the model in the frames that are compared") {
+  Pour::Scene scene = pour_scene();
+  scene.sensors.push_back({"lowest [m]", {0.001, 0}, [](PourModel& model) {
+                             return static_cast<double>(model.fluid().position.row(2).minCoeff());
+                           }});
+  scene.sensors.push_back({"time [s]", {0.001, 0}, [](PourModel& model) { return model.time(); }});
+  const Pour pour = pour_of(scene);
+  const Observation seen = pour.predict({{}, 1, false});
+  REQUIRE(seen.silhouettes.size() == 1);
+  REQUIRE(seen.readings.size() == 2);
+  CHECK(seen.readings[0].name() == "lowest [m]");
+  PourModel model = pour.started({{}, 1, false});
+  const double start = model.time();
+  for (std::size_t frame = 0; frame < scene.times.size(); ++frame) {
+    while (model.time() < start + scene.times[frame] - 1e-9) {
+      const double left = start + scene.times[frame] - model.time();
+      REQUIRE(model.step(std::min(SimulatedInteractionSettings{}.longest_step, left)).advanced());
+    }
+    CHECK(seen.readings[0].value(frame) == static_cast<double>(model.fluid().position.row(2).minCoeff()));
+    CHECK(seen.readings[0].time(frame) == scene.times[frame]);
+    CHECK(seen.readings[1].value(frame) == Approx(start + scene.times[frame]).margin(1e-6));
+  }
+  CHECK(seen.readings[0].value(6) < seen.readings[0].value(0) - 0.05);  // it has been poured
+  Pour::Scene without_cameras = scene;
+  without_cameras.cameras.clear();
+  const Observation read = pour_of(without_cameras).predict({{}, 1, false});
+  CHECK(read.silhouettes.empty());
+  CHECK(read.readings[0].values() == seen.readings[0].values());
+  scene.sensors[1].error.deviation = 0;
+  CHECK_THROWS_WITH(pour_of(scene), decant_test::contains("'time [s]': deviation"));
+  scene.sensors[1].read = nullptr;
+  CHECK_THROWS_WITH(pour_of(scene), decant_test::contains("what 'time [s]' reads"));
+}
+
 TEST_CASE("simulated interaction: an effect of a user's own is a force, a name and a range") {
   auto effects = pour_catalogue();
   Effect stirrer;
@@ -439,7 +502,8 @@ TEST_CASE("simulated interaction: an effect of a user's own is a force, a name a
   settings.spacing = 0.009;
   const Pour pour(pour_scene(), effects, settings);
   CHECK(pour.started(run_with(pour, "stirrer", {40})).force<Stirrer>().rate == 40);
-  CHECK(apart(pour.predict(run_with(pour, "stirrer", {40}))[0], pour.predict({{}, 1, false})[0]) > 5);
+  CHECK(apart(pour.predict(run_with(pour, "stirrer", {40})).silhouettes[0],
+              pour.predict({{}, 1, false}).silhouettes[0]) > 5);
 }
 
 TEST_CASE("simulated interaction: scenes, effects and runs are checked") {

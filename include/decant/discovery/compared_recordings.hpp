@@ -23,7 +23,7 @@
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/interaction_runs.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
-#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/observation.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -45,7 +45,7 @@ template <ForwardModel Model>
 std::vector<double> distances_left(InteractionRuns<Model>& make,
                                    const std::vector<typename InteractionRuns<Model>::Run>& runs, std::size_t seeds,
                                    const std::vector<RecordedEvidence>& recorded) {
-  const std::vector<typename InteractionRuns<Model>::Series> seen = make(runs);
+  const std::vector<Observation> seen = make(runs);
   std::vector<double> result;
   for (const auto* next = seen.data(); next < seen.data() + seen.size();) {
     double sum = 0;
@@ -97,7 +97,7 @@ class RecordingComparison {
         runs.emplace_back(&each, planned.run);
       }
     }
-    const std::vector<Series> seen = (*runs_)(runs);
+    const std::vector<Observation> seen = (*runs_)(runs);
     ComparedRecordings known;
     known.effects = effects;
     for (std::size_t k = 0; k < effects.size(); ++k) {
@@ -149,7 +149,7 @@ class RecordingComparison {
           runs.emplace_back(&each, planned.run);
         }
       }
-      const std::vector<Series> seen = (*runs_)(runs);
+      const std::vector<Observation> seen = (*runs_)(runs);
       for (std::size_t k = 0; k < of.size(); ++k) {
         EffectDictionary& dictionary = known.dictionary[k];
         dictionary.effects = known.effects;
@@ -164,7 +164,6 @@ class RecordingComparison {
   }
 
  private:
-  using Series = typename InteractionRuns<Model>::Series;
   using Run = typename InteractionRuns<Model>::Run;
 
   /// Recordings with dictionaries.

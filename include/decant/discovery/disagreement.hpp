@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// Where in the picture, and when, simulation and recording disagree.
+/// Where in the picture, or which sensor, and when simulation and recording disagree.
 
 #include <algorithm>
 #include <array>
@@ -16,6 +16,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/target.hpp>
+#include <decant/discovery/reading_features.hpp>
 #include <decant/discovery/silhouette_features.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -102,6 +103,46 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     one.onset_u /= total;
     one.onset_v /= total;
     if (one.largest > threshold || one.squares >= many) {
+      found.push_back(one);
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.weight > b.weight; });
+  return found;
+}
+
+/// A sensor that for a while reads more than expected, or less.
+struct ReadingDisagreement {
+  std::size_t sensor = 0;
+  bool more = true;
+  double begin = 0, end = 0;  ///< of its readings [s]
+  double weight = 0;          ///< sum of squares, each counted in what differs anyway
+  double largest = 0;         ///< of its windows, counted in what differs anyway
+  std::size_t windows = 0;    ///< of time
+};
+
+/// The same for readings: windows of one sensor that follow each other, four of which disagree already from three
+/// quarters of the threshold on.
+inline std::vector<ReadingDisagreement> find_disagreements(const ReadingFeatures& features, const Eigen::VectorXd& off,
+                                                           double threshold = 4) {
+  expects(off.size() == static_cast<Eigen::Index>(features.size()), "find_disagreements: deviations",
+          "as many as features", off.size());
+  expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
+  constexpr std::size_t many = 4;
+  std::vector<ReadingDisagreement> found;
+  for (std::size_t k = 0; k < features.size();) {
+    const auto size_of = [&](std::size_t feature) { return off[static_cast<Eigen::Index>(feature)]; };
+    ReadingDisagreement one{features.place(k).sensor, size_of(k) > 0, features.place(k).begin};
+    while (k < features.size() && features.place(k).sensor == one.sensor &&
+           (one.more ? size_of(k) : -size_of(k)) > 0.75 * threshold) {
+      one.end = features.place(k).end;
+      one.weight += size_of(k) * size_of(k);
+      one.largest = std::max(one.largest, std::abs(size_of(k)));
+      ++one.windows;
+      ++k;
+    }
+    if (one.windows == 0) {
+      ++k;
+    } else if (one.largest > threshold || one.windows >= many) {
       found.push_back(one);
     }
   }

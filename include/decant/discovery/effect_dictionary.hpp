@@ -17,7 +17,7 @@
 #include <decant/core/target.hpp>
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/forward_model.hpp>
-#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/observation.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -129,7 +129,7 @@ inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& r
 struct EffectDictionary {
   std::vector<Effect> effects{};
   std::vector<PlannedRun> runs{};
-  std::vector<std::vector<SilhouetteSeries>> seen{};  ///< by run and camera; of runs that failed empty
+  std::vector<Observation> seen{};  ///< by run; of runs that failed empty
 
   bool worked(std::size_t run) const { return !seen.at(run).empty(); }
   /// Numbers of the runs of a role that did not fail.

@@ -24,6 +24,9 @@
 #include <decant/discovery/effect_curve.hpp>
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/nuisance_space.hpp>
+#include <decant/discovery/observation.hpp>
+#include <decant/discovery/observation_features.hpp>
+#include <decant/discovery/reading_features.hpp>
 #include <decant/discovery/silhouette_features.hpp>
 #include <decant/discovery/silhouette_gap.hpp>
 #include <decant/discovery/silhouette_series.hpp>
@@ -47,35 +50,35 @@ struct EffectEvidence {
 /// Settings of RecordedEvidence.
 struct RecordedEvidenceSettings {
   SilhouetteFeatureSettings features{};
+  ReadingFeatureSettings readings{};
   NuisanceSettings nuisance{};
 };
 
 /// A recording in which nothing is missing, and runs of a model of it: baselines and draws.
 struct ReferenceRecording {
-  std::vector<SilhouetteSeries> recording{};     ///< by camera
+  Observation recording{};
   const EffectDictionary* dictionary = nullptr;  ///< has to outlive those that it is given to
 };
 
 /// Compares a recording with a dictionary of the same interaction.
 class RecordedEvidence {
  public:
-  using Series = std::vector<SilhouetteSeries>;
-
-  /// @param recording by camera. @param dictionary has to outlive it. @param references of interactions that the model
+  /// @param dictionary has to outlive it. @param references of interactions that the model
   /// predicts alike(): what they are off from their predictions is taken off what was recorded, see NuisanceSpace.
-  /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras or frames are others.
-  RecordedEvidence(Series recording, const EffectDictionary& dictionary, const RecordedEvidenceSettings& settings = {},
-                   std::vector<ReferenceRecording> references = {})
+  /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras, sensors or times are
+  /// others.
+  RecordedEvidence(Observation recording, const EffectDictionary& dictionary,
+                   const RecordedEvidenceSettings& settings = {}, std::vector<ReferenceRecording> references = {})
       : recording_(std::move(recording)),
         dictionary_(&dictionary),
         settings_(settings),
         references_(std::move(references)),
-        features_(recording_, working(dictionary), settings.features) {
+        features_(recording_, working(dictionary), settings.features, settings.readings) {
     const std::vector<std::size_t> baselines = dictionary.of_role(RunRole::Baseline);
     draws_ = dictionary.of_role(RunRole::Draw);
     expects(!baselines.empty(), "RecordedEvidence: baselines that worked", "at least one", "none");
     expects(draws_.size() >= 5, "RecordedEvidence: draws that worked", "at least 5", draws_.size());
-    expects(features_.size() > 0, "RecordedEvidence: liquid in the recording or in runs", "some", "none");
+    expects(features_.size() > 0, "RecordedEvidence: liquid in the recording or in runs, or readings", "some", "none");
     for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
       if (dictionary.worked(run)) {
         of_run_[run] = features_.of(dictionary.seen[run]);
@@ -98,11 +101,12 @@ class RecordedEvidence {
     for (std::size_t k = 0; k < references_.size(); ++k) {
       sample_.references.col(static_cast<Eigen::Index>(k)) = residual(references_[k]);
     }
+    sample_.floor = features_.floor(settings.nuisance.floor);
     space_ = std::make_unique<NuisanceSpace>(sample_, settings.nuisance);
     own_ = space_->as_modelled(features_.of(recording_));
   }
 
-  const SilhouetteFeatures& features() const noexcept { return features_; }
+  const ObservationFeatures& features() const noexcept { return features_; }
   const NuisanceSpace& space() const noexcept { return *space_; }
   std::size_t draws() const noexcept { return draws_.size(); }
 
@@ -114,10 +118,10 @@ class RecordedEvidence {
   const Eigen::VectorXd& recorded_features() const noexcept { return own_; }
   const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
 
-  /// The mean features of runs, by run and camera; nothing if one of them failed.
-  std::optional<Eigen::VectorXd> mean_features(std::span<const Series> runs) const {
+  /// The mean features of runs; nothing if one of them failed.
+  std::optional<Eigen::VectorXd> mean_features(std::span<const Observation> runs) const {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features_.size()));
-    for (const Series& run : runs) {
+    for (const Observation& run : runs) {
       if (run.empty()) {
         return std::nullopt;
       }
@@ -138,16 +142,18 @@ class RecordedEvidence {
   EffectEvidence of_recording() const { return evidence(recording_, own_, *space_); }
 
   /// How much a reference would look like this interaction, as the model has both: the distance between predictions
-  /// where nothing is missing, about 1 for what is within tolerances. Infinite where cameras or frames are others.
+  /// where nothing is missing, about 1 for what is within tolerances. Infinite where cameras, sensors or times are
+  /// others.
   double unlikeness(const ReferenceRecording& reference) const {
-    bool same = features_.fit(reference.recording);
-    for (std::size_t camera = 0; same && camera < recording_.size(); ++camera) {
-      const SilhouetteSeries &own = recording_[camera], &other = reference.recording[camera];
-      for (std::size_t frame = 1; same && frame < own.frames(); ++frame) {
-        const double passed = own.time(frame) - own.time(0);
-        const double between = own.time(frame) - own.time(frame - 1);
-        same = std::abs(other.time(frame) - other.time(0) - passed) < 0.5 * between;
-      }
+    const Observation& other = reference.recording;
+    bool same = features_.fit(other);
+    for (std::size_t camera = 0; same && camera < recording_.silhouettes.size(); ++camera) {
+      const SilhouetteSeries& own = recording_.silhouettes[camera];
+      same = at_same_times(own, other.silhouettes[camera], own.frames());
+    }
+    for (std::size_t sensor = 0; same && sensor < recording_.readings.size(); ++sensor) {
+      const ReadingSeries& own = recording_.readings[sensor];
+      same = at_same_times(own, other.readings[sensor], own.size());
     }
     return same ? space_->distance(space_->standardised(expected(*reference.dictionary)))
                 : std::numeric_limits<double>::infinity();
@@ -169,14 +175,25 @@ class RecordedEvidence {
   }
 
  private:
-  static std::vector<Series> working(const EffectDictionary& dictionary) {
-    std::vector<Series> result;
+  static std::vector<std::vector<SilhouetteSeries>> working(const EffectDictionary& dictionary) {
+    std::vector<std::vector<SilhouetteSeries>> result;
     for (std::size_t run = 0; run < dictionary.runs.size(); ++run) {
       if (dictionary.worked(run)) {
-        result.push_back(dictionary.seen[run]);
+        result.push_back(dictionary.seen[run].silhouettes);
       }
     }
     return result;
+  }
+
+  /// Counted from the first one, within half of what is between two.
+  template <class Series>
+  static bool at_same_times(const Series& own, const Series& other, std::size_t count) {
+    bool same = true;
+    for (std::size_t k = 1; same && k < count; ++k) {
+      const double between = own.time(k) - own.time(k - 1);
+      same = std::abs(other.time(k) - other.time(0) - (own.time(k) - own.time(0))) < 0.5 * between;
+    }
+    return same;
   }
 
   /// What a model predicts where nothing is missing, as NuisanceSpace::center has it.
@@ -220,12 +237,12 @@ class RecordedEvidence {
     return runs;
   }
 
-  EffectEvidence evidence(const Series& seen, const Eigen::VectorXd& features, const NuisanceSpace& space) const {
+  EffectEvidence evidence(const Observation& seen, const Eigen::VectorXd& features, const NuisanceSpace& space) const {
     EffectEvidence result;
     const Eigen::VectorXd standardised = space.standardised(features);
     result.distance = space.distance(standardised);
-    const auto overlap = [&](const Series& other) { return overlap_gap(seen, other); };
-    const auto blurred = [&](const Series& other) { return blurred_gap(seen, other); };
+    const auto overlap = [&](const Observation& other) { return overlap_gap(seen.silhouettes, other.silhouettes); };
+    const auto blurred = [&](const Observation& other) { return blurred_gap(seen.silhouettes, other.silhouettes); };
     result.overlap.without = baseline_gap(overlap);
     result.blurred.without = baseline_gap(blurred);
     const double chaotic = chaos(space);
@@ -315,11 +332,11 @@ class RecordedEvidence {
     return total;
   }
 
-  Series recording_;
+  Observation recording_;
   const EffectDictionary* dictionary_;
   RecordedEvidenceSettings settings_;
   std::vector<ReferenceRecording> references_{};
-  SilhouetteFeatures features_;
+  ObservationFeatures features_;
   std::vector<std::size_t> draws_{};
   Eigen::VectorXd own_{};  ///< features of the recording, see recorded_features
   std::map<std::size_t, Eigen::VectorXd> of_run_{};

@@ -27,7 +27,7 @@
 #include <decant/discovery/interaction_runs.hpp>
 #include <decant/discovery/missing_effect_result.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
-#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/observation.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -109,7 +109,6 @@ class EffectRefiner {
   }
 
  private:
-  using Series = typename InteractionRuns<Model>::Series;
   using Run = typename InteractionRuns<Model>::Run;
   using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
 
@@ -162,8 +161,8 @@ class EffectRefiner {
         }
       }
     }
-    const std::vector<Series> seen = (*runs_)(runs);
-    const Series* next = seen.data();
+    const std::vector<Observation> seen = (*runs_)(runs);
+    const Observation* next = seen.data();
     for (Candidate& each : candidates) {
       if (each.settled) {
         continue;
@@ -212,7 +211,7 @@ class EffectRefiner {
 
   /// @param seen of runs at the point, then below and above of each of its numbers.
   std::optional<RefinementView> view_of(const EffectPoint& point, const RecordedEvidence& recorded,
-                                        const Series* seen) const {
+                                        const Observation* seen) const {
     const std::size_t seeds = slope_seeds(point);
     const auto middle = recorded.mean_features({seen, middle_seeds()});
     seen += middle_seeds();
@@ -246,9 +245,10 @@ class EffectRefiner {
         runs.back().second.tolerated = true;
       }
     }
-    const std::vector<Series> seen = (*runs_)(runs);
+    const std::vector<Observation> seen = (*runs_)(runs);
     std::vector<Eigen::VectorXd> moves;
-    for (const Series* next = seen.data(); !views.empty() && next < seen.data() + seen.size(); next += of_->size()) {
+    for (const Observation* next = seen.data(); !views.empty() && next < seen.data() + seen.size();
+         next += of_->size()) {
       std::vector<Eigen::VectorXd> features;
       for (std::size_t k = 0; k < of_->size(); ++k) {
         if (const auto one = known.recorded[k].mean_features({next + k, 1})) {

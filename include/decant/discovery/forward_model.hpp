@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// What predicts an interaction as cameras would see it, with effects that the model may lack: a liquid simulator, or
-/// anything else.
+/// What predicts an interaction as cameras would see it and sensors read it, with effects that the model may lack: a
+/// liquid simulator, or anything else.
 
 #include <concepts>
 #include <cstddef>
@@ -16,7 +16,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/discovery/effect.hpp>
-#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/observation.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -43,13 +43,14 @@ struct Sighting {
 };
 
 /// Predicts one interaction, with the bodies moving as they were recorded to.
-/// effects(): what it can be given. predict(run): what each camera would have seen, in the recording's frames; empty
-/// where the model failed. A pure function, called from several threads at once; it may take seconds. Throws
-/// std::invalid_argument for an effect that there is not, or another number of components.
+/// effects(): what it can be given. predict(run): what each camera would have seen, in the recording's frames, and each
+/// sensor would have read, without its errors, at the recording's times; empty where the model failed, and a reading
+/// that it cannot predict not finite, which is no better. A pure function, called from several threads at once; it may
+/// take seconds. Throws std::invalid_argument for an effect that there is not, or another number of components.
 template <class M>
 concept ForwardModel = requires(const M& model, const ModelRun& run) {
   { model.effects() } -> std::convertible_to<const std::vector<Effect>&>;
-  { model.predict(run) } -> std::convertible_to<std::vector<SilhouetteSeries>>;
+  { model.predict(run) } -> std::convertible_to<Observation>;
 };
 
 /// One that can tell where an effect would act of which something was seen: place_of(effect, sighting), in the model's

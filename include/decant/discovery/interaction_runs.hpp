@@ -15,7 +15,7 @@
 #include <decant/core/target.hpp>
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/forward_model.hpp>
-#include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/observation.hpp>
 #include <decant/hypothesis/executor.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -24,8 +24,8 @@ namespace decant::inline DECANT_TARGET {
 template <ForwardModel Model>
 struct Interaction {
   std::string name{};
-  const Model* model = nullptr;               ///< has to outlive the workflow
-  std::vector<SilhouetteSeries> recording{};  ///< by camera
+  const Model* model = nullptr;  ///< has to outlive the workflow
+  Observation recording{};
   std::string
       of_model{};  ///< all that the model's predictions depend on, for RunJobs' keys; the name where it is empty
 };
@@ -47,13 +47,13 @@ RunJobs run_jobs_on(ExecutorType& executor, Done done = tell_nobody) {
 template <ForwardModel Model>
 class InteractionRuns {
  public:
-  using Series = std::vector<SilhouetteSeries>;  ///< by camera
   using Run = std::pair<const Interaction<Model>*, ModelRun>;
 
   explicit InteractionRuns(RunJobs run_jobs) : run_jobs_(std::move(run_jobs)) {}
 
-  /// Runs of several interactions, in their order; those that failed are empty.
-  std::vector<Series> operator()(const std::vector<Run>& runs) {
+  /// Runs of several interactions, in their order; those that failed are empty. Where all that is tolerated is drawn,
+  /// what sensors err by is, too.
+  std::vector<Observation> operator()(const std::vector<Run>& runs) {
     std::vector<std::string> keys;
     std::vector<std::size_t> job_of, first;  // equal runs are made once
     std::map<std::string, std::size_t> number;
@@ -70,18 +70,17 @@ class InteractionRuns {
     }
     const std::vector<JobResult> results = run_jobs_(keys, [&](std::size_t job) {
       const auto& [interaction, run] = runs[first[job]];
-      JobResult numbers;
-      for (const SilhouetteSeries& series : interaction->model->predict(run)) {
-        const std::vector<double> own = series.numbers();
-        numbers.push_back(static_cast<double>(own.size()));
-        numbers.insert(numbers.end(), own.begin(), own.end());
-      }
-      return numbers;
+      return Observation(interaction->model->predict(run)).numbers();
     });
     made_ += keys.size();
-    std::vector<Series> seen;
+    std::vector<Observation> seen;
     for (std::size_t k = 0; k < runs.size(); ++k) {
-      seen.push_back(series_of(results.at(job_of[k]), runs[k].first->recording));
+      const auto& [interaction, run] = runs[k];
+      Observation predicted = interaction->recording.with_numbers(results.at(job_of[k]));
+      if (!predicted.covers(interaction->recording)) {
+        predicted = {};
+      }
+      seen.push_back(run.tolerated ? predicted.with_errors(run.seed) : std::move(predicted));
     }
     return seen;
   }
@@ -89,22 +88,6 @@ class InteractionRuns {
   std::size_t made() const noexcept { return made_; }  ///< of different runs, in all calls together
 
  private:
-  static Series series_of(const JobResult& numbers, const Series& recording) {
-    Series seen;
-    std::size_t begin = 0;
-    for (const SilhouetteSeries& camera : recording) {
-      if (begin >= numbers.size()) {
-        return {};
-      }
-      const auto count = static_cast<std::size_t>(numbers[begin]);
-      expects(begin + 1 + count <= numbers.size(), "InteractionRuns: numbers of a run", "as many as they say",
-              numbers.size());
-      seen.push_back(camera.with_numbers(std::span(numbers).subspan(begin + 1, count)));
-      begin += 1 + count;
-    }
-    return seen;
-  }
-
   RunJobs run_jobs_;
   std::size_t made_ = 0;
 };

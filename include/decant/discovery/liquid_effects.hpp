@@ -252,7 +252,8 @@ inline std::vector<std::pair<double, double>> steady(double millilitres_per_seco
 }  // namespace detail
 
 /// A hole. @param place where liquid goes out, and @param below how far from there it goes on outside of the wall, both
-/// in the body's frame [m]. @param where in words.
+/// in the body's frame [m]: at other places along the wall beside them, at such nearer to it or farther off it as far
+/// outside as here. @param where in words.
 template <class Model>
 InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, const Vector3<double>& below,
                                      std::string where) {
@@ -263,19 +264,21 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
   effect.place_tolerance = 0.02;
   effect.seen_first = SeenFirst::Liquid;
   effect.where = std::move(where);
-  auto result = detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
-                                          [body, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-                                            OutletSettings outlet;
-                                            outlet.body = body;
-                                            outlet.position = *as.place;
-                                            outlet.exit = *as.place + below;
-                                            outlet.flow = detail::steady(as.strength[0]);
-                                            changes.of_model.push_back([outlet](Model& model) {
-                                              OutletSettings own = outlet;
-                                              own.radius = 3 * model.spacing();
-                                              model.add_outlet(own);
-                                            });
-                                          });
+  auto result =
+      detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                [body, place, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                  OutletSettings outlet;
+                                  outlet.body = body;
+                                  outlet.position = *as.place;
+                                  const Vector3<double> moved = *as.place - place, out = below.normalized();
+                                  outlet.exit = place + below + moved - out * out.dot(moved);
+                                  outlet.flow = detail::steady(as.strength[0]);
+                                  changes.of_model.push_back([outlet](Model& model) {
+                                    OutletSettings own = outlet;
+                                    own.radius = 3 * model.spacing();
+                                    model.add_outlet(own);
+                                  });
+                                });
   result.of_body = body;
   return result;
 }

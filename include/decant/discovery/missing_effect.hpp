@@ -27,6 +27,7 @@
 #include <decant/discovery/interaction_runs.hpp>
 #include <decant/discovery/missing_effect_result.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
+#include <decant/discovery/observation_features.hpp>
 #include <decant/discovery/smallest_seen.hpp>
 
 namespace decant::inline DECANT_TARGET {
@@ -70,6 +71,7 @@ class MissingEffectSearch {
     }
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
+    expects(settings_.most_left > 0, "MissingEffectSettings: most_left", "> 0", settings_.most_left);
     expects(settings_.promising_factor >= 0, "MissingEffectSettings: promising_factor", ">= 0",
             settings_.promising_factor);
     expects(settings_.alike_factor >= 1, "MissingEffectSettings: alike_factor", ">= 1", settings_.alike_factor);
@@ -95,7 +97,12 @@ class MissingEffectSearch {
       if (round == 0) {
         result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
         for (const RecordedEvidence& each : known.recorded) {
-          result.where.push_back(find_disagreements(each.features(), beyond_chance(each), settings_.threshold));
+          const Eigen::VectorXd off = beyond_chance(each);
+          const ObservationFeatures& features = each.features();
+          result.where.push_back(
+              find_disagreements(features.silhouettes(), features.of_silhouettes(off), settings_.threshold));
+          result.where_read.push_back(
+              find_disagreements(features.readings(), features.of_readings(off), settings_.threshold));
         }
         const std::vector<double>& shares = settings_.dictionary.shares;
         result.smallest_seen =
@@ -121,7 +128,9 @@ class MissingEffectSearch {
       const double together = round + 1;
       const double least =
           down_to_chance ? settings_.least_share_to_chance : 1 - (1 - settings_.least_share) / together;
-      const bool explains = !refined.empty() && refined.front().share >= least;
+      const bool leaves_little =
+          !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
+      const bool explains = leaves_little && refined.front().share >= least;
       if (round == 0) {
         for (const RefinedTogether& each : refined) {
           result.refined.push_back(each.effects.front());
@@ -137,7 +146,8 @@ class MissingEffectSearch {
         result.one_of = alike(result.refined, known.chance, result.learn.before);
       }
       if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
-          refined.front().share >= settings_.enough_share || !is_promising(refined.front().share, together)) {
+          (leaves_little && refined.front().share >= settings_.enough_share) ||
+          !is_promising(refined.front().share, together)) {
         break;
       }
     }

@@ -70,8 +70,9 @@ struct MissingEffect {
   Judgement judgement{};                 ///< of the first round, before refinement
   std::vector<Effect> judged{};          ///< what its numbers are of: the models' effects, and then those of them that
                                          ///< were also tried where recordings begin to disagree
-  std::vector<std::vector<Disagreement>> where{};  ///< by recording, before anything was added
-  std::vector<SmallestSeen> smallest_seen{};       ///< of each effect that is judged
+  std::vector<std::vector<Disagreement>> where{};              ///< in pictures, by recording, before anything was added
+  std::vector<std::vector<ReadingDisagreement>> where_read{};  ///< the same of sensors
+  std::vector<SmallestSeen> smallest_seen{};                   ///< of each effect that is judged
   GapChange learn{}, held_out{};
   Confirmation confirmation = Confirmation::Untested;
   std::size_t taught_by = 0;  ///< references that look like each of the recordings: these are compared without what

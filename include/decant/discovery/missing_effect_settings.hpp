@@ -23,18 +23,21 @@ struct MissingEffectSettings {
   double least_share = 0.7;            ///< of what is reducible an effect has to explain in the end, 0 .. 1; several
                                        ///< together may leave so many times less
   double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
-  double enough_share = 0.85;          ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
-                                       ///< what is left may be how the model has them
-  double promising_factor = 0.8;       ///< on n / (n + 1), >= 0: unless n effects explain so much, no further one is
-                                       ///< looked for
-  double alike_factor = 2;             ///< on what chance explains, >= 1: what explains less than so much more is no
-                                       ///< better an answer
-  int most_effects = 3;                ///< that are added one after another, >= 1
-  double reference_factor = 1.1;       ///< on what references do, >= 1: beyond it something is missing
-  double most_unlike = 0.5;            ///< references that look more unlike a recording teach nothing about how its
-                                       ///< features are off, >= 0; see RecordedEvidence::unlikeness
-  int least_references = 2;            ///< that have to look like a recording for them to teach that, >= 2
-  double threshold = 4;                ///< of find_disagreements
+  double most_left = 5;           ///< over what chance leaves at most, > 0: what leaves more of a gap does not explain
+                                  ///< it, whatever its share. Effects of a simulation are not those of reality to
+                                  ///< the last cell; where a model is as exact as its sensors ask for 1 to 2
+  double enough_share = 0.85;     ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
+                                  ///< what is left may be how the model has them
+  double promising_factor = 0.8;  ///< on n / (n + 1), >= 0: unless n effects explain so much, no further one is
+                                  ///< looked for
+  double alike_factor = 2;        ///< on what chance explains, >= 1: what explains less than so much more is no
+                                  ///< better an answer
+  int most_effects = 3;           ///< that are added one after another, >= 1
+  double reference_factor = 1.1;  ///< on what references do, >= 1: beyond it something is missing
+  double most_unlike = 0.5;       ///< references that look more unlike a recording teach nothing about how its
+                                  ///< features are off, >= 0; see RecordedEvidence::unlikeness
+  int least_references = 2;       ///< that have to look like a recording for them to teach that, >= 2
+  double threshold = 4;           ///< of find_disagreements
 };
 
 }  // namespace decant::inline DECANT_TARGET

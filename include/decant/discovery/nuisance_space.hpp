@@ -22,14 +22,15 @@ struct NuisanceSample {
   Eigen::MatrixXd templates{};   ///< p x m: how features answer an error of measurement of one tolerance
   Eigen::MatrixXd references{};  ///< p x r: of recordings that are known to have no hidden effect, less the baseline of
                                  ///< their own poses
+  Eigen::VectorXd floor{};       ///< by feature: its least standard deviation, > 0; the settings' where there is none
 
   /// The same as if one of the draws had not been made.
   NuisanceSample without_draw(Eigen::Index draw) const {
-    return {baseline, without_column(draws, draw), templates, references};
+    return {baseline, without_column(draws, draw), templates, references, floor};
   }
   /// Or one of the references.
   NuisanceSample without_reference(Eigen::Index reference) const {
-    return {baseline, draws, templates, without_column(references, reference)};
+    return {baseline, draws, templates, without_column(references, reference), floor};
   }
 
  private:
@@ -72,7 +73,12 @@ class NuisanceSpace {
     always_ = Vector::Zero(features);
     Matrix off = sample.draws.colwise() - center_;
     Matrix templates = sample.templates;
-    Vector variance = off.array().square().rowwise().mean() + settings.floor * settings.floor;
+    Vector variance = off.array().square().rowwise().mean();
+    if (sample.floor.size() > 0) {
+      variance += sample.floor.cwiseAbs2();
+    } else {
+      variance.array() += settings.floor * settings.floor;
+    }
     if (sample.references.cols() > 0) {
       always_ = sample.references.rowwise().mean();
       const Matrix scatter = sample.references.colwise() - always_;
@@ -140,6 +146,10 @@ class NuisanceSpace {
     expects(sample.draws.cols() >= 4, "NuisanceSpace: draws", "at least 4", sample.draws.cols());
     expects(sample.baseline.cols() >= 1, "NuisanceSpace: baseline", "at least one simulation", sample.baseline.cols());
     expects(sample.draws.rows() >= 1, "NuisanceSpace: features", "at least one", sample.draws.rows());
+    expects(sample.floor.size() == 0 || sample.floor.size() == sample.draws.rows(), "NuisanceSpace: floors",
+            "one for each feature", sample.floor.size());
+    expects(sample.floor.size() == 0 || (sample.floor.minCoeff() > 0 && sample.floor.allFinite()),
+            "NuisanceSpace: floors", "> 0 and finite", sample.floor.size() == 0 ? 0 : sample.floor.minCoeff());
     for (const Matrix* each : {&sample.draws, &sample.baseline, &sample.templates, &sample.references}) {
       expects(each->cols() == 0 || each->rows() == sample.draws.rows(), "NuisanceSpace: features of all matrices",
               "as many as of the draws", each->rows());

@@ -2,7 +2,7 @@
 #pragma once
 
 /// The forward model that ships: a liquid simulation among bodies that move as they were recorded to, open loop, drawn
-/// as cameras would see it, with effects added.
+/// as cameras would see it and read as sensors would, with effects added.
 
 #include <algorithm>
 #include <cmath>
@@ -16,6 +16,7 @@
 #include <optional>
 #include <random>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +32,8 @@
 #include <decant/correction/open_loop.hpp>
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/forward_model.hpp>
+#include <decant/discovery/observation.hpp>
+#include <decant/discovery/reading_series.hpp>
 #include <decant/discovery/silhouette_series.hpp>
 #include <decant/simulation/simulator_settings.hpp>
 #include <decant/tracking/tracker.hpp>
@@ -46,6 +49,16 @@ struct InteractionCamera {
   double distance = 1;                  ///< about how far off the liquid is [m]
 };
 
+/// A sensor of an interaction that gives one number at a time: a scale, a level probe.
+template <class Model>
+struct InteractionSensor {
+  std::string name{};  ///< for people, with its unit
+  ReadingError error{};
+  /// What it reads of a simulation as it is now, without its errors; called for each frame, from several threads, each
+  /// with a model of its own.
+  std::function<double(Model& model)> read{};
+};
+
 /// How an interaction went, as far as it was recorded.
 template <class Model, class CameraType>
 struct InteractionScene {
@@ -55,7 +68,8 @@ struct InteractionScene {
   std::function<Model(SimulatorSettings solver, double fill)> start{};
   std::vector<PoseTrack> motion{};  ///< of each body, on the recording's clock
   std::vector<InteractionCamera<CameraType>> cameras{};
-  std::vector<double> times{};  ///< of the frames that are compared, on the recording's clock [s]
+  std::vector<InteractionSensor<Model>> sensors{};  ///< read in the frames that are compared
+  std::vector<double> times{};                      ///< of these frames, on the recording's clock [s]
 };
 
 /// What effects can change about a run.
@@ -138,6 +152,11 @@ class SimulatedInteraction {
     for (const auto& camera : scene_.cameras) {
       expects(camera.camera_from_world.size() == scene_.times.size(), "SimulatedInteraction: poses of a camera",
               "one for each frame", camera.camera_from_world.size());
+    }
+    for (const InteractionSensor<Model>& sensor : scene_.sensors) {
+      expects(static_cast<bool>(sensor.read), "SimulatedInteraction: what '" + sensor.name + "' reads", "a function",
+              "none");
+      static_cast<void>(ReadingSeries(sensor.name, sensor.error));  // throws if the error is out of range
     }
     expects(settings.spacing > 0, "SimulatedInteraction: spacing [m]", "> 0", settings.spacing);
     expects(!settings.discretisations.empty(), "SimulatedInteraction: discretisations", "at least one", "none");
@@ -246,28 +265,42 @@ class SimulatedInteraction {
   /// The model of a run as it starts: its clock stands at what is the first frame's time, its bodies are in motion.
   Model started(const ModelRun& run) const {
     const auto [changes, discretisation] = this->changes(run);
-    return started(changes, discretisation, run.seed);
+    Model model = unchanged(changes, discretisation, run.seed);
+    change(model, changes);
+    return model;
   }
 
-  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
-    std::vector<SilhouetteSeries> seen;
+  Observation predict(const ModelRun& run) const {
+    Observation seen;
     for (const auto& camera : scene_.cameras) {
-      seen.emplace_back(camera.camera.width(), camera.camera.height(), settings_.cell_px);
+      seen.silhouettes.emplace_back(camera.camera.width(), camera.camera.height(), settings_.cell_px);
     }
-    const bool ended = watch(run, [&](std::size_t frame, Model&, std::span<const Mask> masks) {
+    for (const InteractionSensor<Model>& sensor : scene_.sensors) {
+      seen.readings.emplace_back(sensor.name, sensor.error);
+    }
+    const bool ended = watch(run, [&](std::size_t frame, Model& model, std::span<const Mask> masks) {
       for (std::size_t camera = 0; camera < masks.size(); ++camera) {
-        seen[camera].add(scene_.times[frame], masks[camera]);
+        seen.silhouettes[camera].add(scene_.times[frame], masks[camera]);
+      }
+      for (std::size_t sensor = 0; sensor < scene_.sensors.size(); ++sensor) {
+        seen.readings[sensor].add(scene_.times[frame], scene_.sensors[sensor].read(model));
       }
     });
-    return ended ? seen : std::vector<SilhouetteSeries>();
+    return ended ? seen : Observation();
   }
 
   /// Runs, and calls frame_is_there(frame, model, masks by camera) for each frame that is compared.
-  /// @return whether the simulation came to its end.
+  /// @return whether the simulation came to its end; false as well where it cannot be given an effect as it is asked
+  /// for: a hole in mid-air.
   template <class FrameIsThere>
   bool watch(const ModelRun& run, FrameIsThere&& frame_is_there) const {
     const auto [changes, discretisation] = this->changes(run);
-    Model model = started(changes, discretisation, run.seed);
+    Model model = unchanged(changes, discretisation, run.seed);
+    try {
+      change(model, changes);
+    } catch (const std::invalid_argument&) {
+      return false;
+    }
     std::vector<Eye> eyes;
     for (const auto& camera : scene_.cameras) {
       eyes.push_back(eye(camera, changes, discretisation.drawing, model));
@@ -321,7 +354,14 @@ class SimulatedInteraction {
     return pose;
   }
 
-  Model started(const Changes& changes, Discretisation discretisation, std::uint32_t seed) const {
+  static void change(Model& model, const Changes& changes) {
+    for (const auto& change : changes.of_model) {
+      change(model);
+    }
+  }
+
+  /// Before it is given what changes itself.
+  Model unchanged(const Changes& changes, Discretisation discretisation, std::uint32_t seed) const {
     discretisation.drawing = 1;  // which matters later
     const Model& start = settled(discretisation, changes.fill);
     const std::vector<Index> kept = lowest(start, amount_of(const_cast<Model&>(start).fluid(), changes.fill));
@@ -364,9 +404,6 @@ class SimulatedInteraction {
       }
       place.col(0) = x.template cast<Scalar>();
       model.add_particles(place, PointArray<Scalar>::Zero(3, 1), before.origin[i]);
-    }
-    for (const auto& change : changes.of_model) {
-      change(model);
     }
     return model;
   }

@@ -213,6 +213,9 @@ inline std::string chart_legend(const LineChart& chart) {
 inline std::string bar_chart_legend(const BarChart& chart) {
   std::string out = "<div class=\"legend\">";
   for (std::size_t n = 0; n < chart.bars.size(); ++n) {
+    if (chart.bars[n].name.empty()) {  // the only ones, as a rule: nothing is to be told apart
+      continue;
+    }
     out += std::string("<span><i style=\"background:") + series_color(n) + "\"></i>" + html_text(chart.bars[n].name) +
            "</span>";
   }
