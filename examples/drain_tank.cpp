@@ -2,13 +2,15 @@
 // The discharge coefficient of a hole through which a tank drains, from a recording of its level, without particles:
 //   drain_tank FOLDER --json OUT.json --report OUT.html
 // The folder is that of G. Fabusola and C. M. Simon, Chem. Eng. Sci. 309 (2025) 121488, with
-// liq_level_data_empty_train.csv and level_sensor_calibration.csv.
-// Exit status 0: done; 2: a file or an argument is wrong.
+// liq_level_data_empty_train.csv and level_sensor_calibration.csv. With --assumed 0.8, also what a model lacks that
+// takes the coefficient for that: the search for missing effects, on a model without particles and cameras. Exit status
+// 0: done; 2: a file or an argument is wrong.
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +23,9 @@
 #include <decant/io/table.hpp>
 
 #include "support/draining_tank.hpp"
+#include "support/draining_tank_effects.hpp"
 #include "support/json_result.hpp"
+#include "support/missing_effect_output.hpp"
 #include "support/tool.hpp"
 
 namespace {
@@ -75,7 +79,16 @@ std::vector<double> in(double unit, const std::vector<double>& values) {
   return result;
 }
 
-void write_report(const std::string& file, const std::vector<Answer>& answers, const example::DrainRecord& record) {
+std::string diagnosis_text(const example::DrainDiagnosis& diagnosis) {
+  return example::missing_effect_sentence(diagnosis.effects, diagnosis.result) +
+         " Levels of the second half, which was not learnt from, are off by " +
+         fixed_text(1e3 * diagnosis.off_before, 1) + " mm as assumed, and by " +
+         fixed_text(1e3 * diagnosis.off_after, 1) + " mm with what was found.";
+}
+
+/// @param diagnosis nullptr: none.
+void write_report(const std::string& file, const std::vector<Answer>& answers, const example::DrainRecord& record,
+                  const example::DrainDiagnosis* diagnosis) {
   decant::HtmlReport report("How well a hole lets water pass");
   report.paragraph("A tank drains through a hole by Torricelli's law, A(h) dh/dt = -c a sqrt(2 g (h - z)). Of " +
                    std::to_string(record.time.size()) +
@@ -116,6 +129,19 @@ void write_report(const std::string& file, const std::vector<Answer>& answers, c
                 "time [s]",
                 "coefficient",
                 {{"median", course.time, median}, {"from", course.time, low, true}, {"to", course.time, high, true}}});
+  if (diagnosis != nullptr) {
+    report.heading("What a model lacks that assumes a coefficient");
+    report.paragraph(diagnosis_text(*diagnosis));
+    report.table(example::gap_table(diagnosis->result));
+    report.table(example::candidates_table(diagnosis->effects, diagnosis->result));
+    report.table(example::where_read_table({"first half"}, {{"level"}}, diagnosis->result));
+    report.chart({"Level by that model; the second half begins anew where it was read",
+                  "time [s]",
+                  "level [cm]",
+                  {{"measured", record.time, in(0.01, record.level)},
+                   {"as assumed", record.time, in(0.01, diagnosis->assumed)},
+                   {"with what was found", record.time, in(0.01, diagnosis->mended)}}});
+  }
   report.write(file);
 }
 
@@ -124,10 +150,13 @@ void write_report(const std::string& file, const std::vector<Answer>& answers, c
 int main(int count, char** values) {
   std::string folder, json_file, report_file;
   decant::Threads threads;
+  std::optional<double> assumed;
   CLI::App app("Finds the discharge coefficient of a hole from the level of the tank that it drains.");
   app.add_option("folder", folder, "with the level's readings and the sensor's calibration")->required();
   app.add_option("--json", json_file, "writes coefficients, intervals and levels");
   app.add_option("--report", report_file, "writes a page with charts, for a browser");
+  app.add_option("--assumed", assumed, "what a model lacks that takes the coefficient for that")
+      ->check(CLI::Range(0.3, 1.2));
   app.add_option("--threads", threads.count, "0: all")->check(CLI::Range(0, 1024));
   return example::run_tool(app, count, values, [&] {
     example::expect_writable({json_file, report_file});
@@ -138,11 +167,22 @@ int main(int count, char** values) {
     answers.push_back({"as_unsure_as_others", "as unsure as other readings",
                        example::fit_discharge(tank, record, record.calibration_error, threads)});
     std::fputs(table_of(answers).text().c_str(), stdout);
+    std::optional<example::DrainDiagnosis> diagnosis;
+    if (assumed) {
+      diagnosis = example::diagnose_drain(tank, record, *assumed, threads);
+      std::printf("%s\n%s", diagnosis_text(*diagnosis).c_str(),
+                  example::candidates_table(diagnosis->effects, diagnosis->result).text().c_str());
+    }
     if (!json_file.empty()) {
-      example::write_result(json_file, to_json(answers, record));
+      nlohmann::json json = to_json(answers, record);
+      if (diagnosis) {
+        json["missing"] = example::missing_effect_json(diagnosis->effects, diagnosis->result, {0, 0, -tank.gravity});
+        json["missing"]["held_out_level_off_m"] = {{"before", diagnosis->off_before}, {"after", diagnosis->off_after}};
+      }
+      example::write_result(json_file, json);
     }
     if (!report_file.empty()) {
-      write_report(report_file, answers, record);
+      write_report(report_file, answers, record, diagnosis ? &*diagnosis : nullptr);
     }
     return 0;
   });

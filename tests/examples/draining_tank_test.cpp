@@ -3,6 +3,7 @@
 // discharge coefficient on levels whose errors last, and the measured recording.
 
 #include "../../examples/support/draining_tank.hpp"
+#include "../../examples/support/draining_tank_effects.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -136,4 +137,65 @@ TEST_CASE("draining tank: the discharge coefficient of the measured one") {
 
 TEST_CASE("draining tank: what is no recording is refused") {
   CHECK_THROWS_AS(read_drain_record(decant_test::repository("examples/data")), std::runtime_error);
+}
+
+TEST_CASE("draining tank: a wrong coefficient is named from the first half, and the second half agrees") {
+  const DrainingTank tank = tank_fabusola2025();
+  // levels by the closed form, read with errors of 3 mm that last for 40 s
+  DrainRecord record;
+  record.calibration_error = 0.003;
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  double off = 0;
+  for (int k = 0; k < 400; ++k) {
+    const double kept = std::exp(-2.0 / 40);
+    off = kept * off + 0.003 * std::sqrt(1 - kept * kept) * normal(random);
+    record.time.push_back(2.0 * k);
+    record.level.push_back(level_after(tank, 0.26, 0.66, 2.0 * k) + off);
+  }
+  const auto name = [](const DrainDiagnosis& diagnosis) {
+    return diagnosis.effects[diagnosis.result.found.front().effect].name;
+  };
+  const DrainDiagnosis wrong = diagnose_drain(tank, record, 0.85);
+  CHECK(wrong.result.verdict == decant::Verdict::Named);
+  REQUIRE(wrong.result.found.size() == 1);
+  CHECK(name(wrong) == "discharge");
+  CHECK(wrong.result.found.front().strength[0] == Approx(0.66).margin(0.05));
+  CHECK(wrong.result.confirmation == decant::Confirmation::Confirmed);
+  CHECK(wrong.off_after < 0.5 * wrong.off_before);
+  CHECK(diagnose_drain(tank, record, 0.66).result.verdict == decant::Verdict::Nothing);
+
+  // the drain was opened late, which the second half knows nothing of
+  for (std::size_t k = 0; k < record.time.size(); ++k) {
+    record.level[k] += level_after(tank, 0.26, 0.66, std::max(0.0, record.time[k] - 60)) -
+                       level_after(tank, 0.26, 0.66, record.time[k]);
+  }
+  const DrainDiagnosis late = diagnose_drain(tank, record, 0.66);
+  REQUIRE(!late.result.found.empty());
+  CHECK(name(late) == "latency");
+  CHECK(late.result.found.front().strength[0] == Approx(60).margin(20));
+  CHECK_THROWS_WITH(diagnose_drain(tank, {{0, 1}, {0.2, 0.19}, 0.003}, 0.66), decant_test::contains("at least 20"));
+}
+
+TEST_CASE(
+    "draining tank: of the measured levels a wrong coefficient is named, and levels are predicted as well as can be") {
+  const auto folder = decant_test::measurements("tank_draining");
+  if (!folder) {
+    return;
+  }
+  const DrainRecord record = read_drain_record(*folder);
+  for (const double assumed : {0.8, 1.0}) {
+    const DrainDiagnosis diagnosis = diagnose_drain(tank_fabusola2025(), record, assumed);
+    REQUIRE(diagnosis.result.found.size() == 1);
+    CHECK(diagnosis.result.verdict == decant::Verdict::Named);
+    CHECK(diagnosis.effects[diagnosis.result.found.front().effect].name == "discharge");
+    const auto [low, high] = diagnosis.result.found.front().interval_90(0);
+    CHECK(low < 0.680);  // Fabusola and Simon 2025
+    CHECK(high > 0.680);
+    // the second half alone does not show the smaller one beyond what its sensor errs by
+    CHECK(diagnosis.result.confirmation ==
+          (assumed < 0.9 ? decant::Confirmation::NotTestable : decant::Confirmation::Confirmed));
+    CHECK(diagnosis.off_before > 0.005);
+    CHECK(diagnosis.off_after < 0.0026);  // theirs, of the whole run that they were fitted to
+  }
 }
