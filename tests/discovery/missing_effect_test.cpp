@@ -171,6 +171,33 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
   }
 }
 
+TEST_CASE("missing effect: the best one goes on for as long as a step gains") {
+  // a tap as far off the usual place as it may be, in both directions
+  const Jet hidden{0, 0, 1, 0, 0, 0, 25, 0.22, 0.67};
+  const JetModel model(0.9, Vector3<double>(0.15, 0.6, 0));
+  ThreadExecutor executor{{1}};
+  const auto off = [&](int last) {
+    MissingEffectSettings settings;
+    settings.refinement_rounds = 1;
+    settings.last_refinement_rounds = last;
+    double sum = 0;
+    for (const std::uint32_t seed : {71U, 72U, 73U}) {
+      const MissingEffect result = MissingEffectSearch<JetModel>({{"a", &model, film_of(hidden, seed, 0.9)}}, {},
+                                                                 run_jobs_on(executor), settings)
+                                       .find();
+      REQUIRE(!result.refined.empty());
+      const RefinedEffect& tap = result.refined.front();
+      CHECK(model.effects()[tap.effect].name == "tap");
+      REQUIRE(tap.place);
+      sum += (*tap.place - Vector3<double>(hidden.tap_x, hidden.tap_y, 0)).head<2>().norm();
+    }
+    return sum / 3;
+  };
+  const double once = off(1), often = off(8);
+  INFO(once << " " << often);
+  CHECK(often < 0.7 * once);
+}
+
 TEST_CASE("missing effect: what reality always does differently is learnt from references of the same interaction") {
   // a gust that the catalogue does not have blows in every pour
   const double foreign = 1;  // [m/s^2]

@@ -70,8 +70,13 @@ class EffectRefiner {
         point.add(effect, number, {number, standing.strength, {}});
       }
     }
-    for (int round = 0; round < settings_.refinement_rounds && !candidates.empty(); ++round) {
-      step_all(candidates, known, static_cast<std::uint32_t>(5001 + 1000 * round));
+    const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
+    for (int round = 0; round < most && !candidates.empty(); ++round) {
+      if (round >= settings_.refinement_rounds) {
+        leave_best_unsettled(candidates);
+      }
+      // none that distances are measured with
+      step_all(candidates, known, static_cast<std::uint32_t>((round < 3 ? 5001 : 10001) + 1000 * round));
       if (round + 1 < settings_.refinement_rounds) {
         keep_promising(candidates, known.chance);
       }
@@ -138,6 +143,16 @@ class EffectRefiner {
     std::erase_if(candidates, [&](const Candidate& each) {
       return each.expected > rival && relative_fall(each.expected, sorted.front()) >= 3 * chance.fall;
     });
+  }
+
+  /// What is far from where it is looked for first takes more steps than others, and what it has not got to by then
+  /// would be another effect's to explain.
+  static void leave_best_unsettled(std::vector<Candidate>& candidates) {
+    const auto best = std::min_element(candidates.begin(), candidates.end(),
+                                       [](const auto& a, const auto& b) { return a.expected < b.expected; });
+    for (auto each = candidates.begin(); each != candidates.end(); ++each) {
+      each->settled = each->settled || each != best;
+    }
   }
 
   /// One step for each of the candidates that is not settled, all runs side by side. A point at which runs fail stays.

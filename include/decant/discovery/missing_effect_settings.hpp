@@ -18,6 +18,7 @@ struct MissingEffectSettings {
   JudgementSettings judgement{};
   int refined = 3;                     ///< so many of the best are looked at more closely, >= 1
   int refinement_rounds = 3;           ///< steps for each, >= 1
+  int last_refinement_rounds = 8;      ///< steps for the best of them in all, as long as each gains
   int repeats = 8;                     ///< of the best one, to see how far estimates scatter, >= 3
   int refinement_seeds = 2;            ///< runs at each point, >= 1
   double least_share = 0.7;            ///< of what is reducible an effect has to explain in the end, 0 .. 1; several
