@@ -143,7 +143,7 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
       text += "; nearest is ";
       text += detail::effect_words(effects, result.refined.front());
       text += ", which explains ";
-      text += decant::detail::fixed_text(100 * std::min(1.0, result.refined.front().share), 0);
+      text += decant::detail::fixed_text(100 * result.refined.front().share, 0);
       text += " % of what is reducible";
     }
     return text + ".";
@@ -162,7 +162,7 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
     text += detail::effect_words(effects, result.found[k]);
   }
   text += ": with it the gap falls by ";
-  text += decant::detail::fixed_text(100 * std::min(1.0, result.learn.share()), 0);
+  text += decant::detail::fixed_text(100 * result.learn.share(), 0);
   return text + " % of what is reducible.";
 }
 
@@ -277,14 +277,14 @@ inline decant::Table candidates_table(const std::vector<decant::Effect>& effects
                                  effect.unit,
                                  detail::components_text(each.strength),
                                  fixed_text(each.distance, 2),
-                                 result.judgement.has_gap() ? fixed_text(100 * std::min(1.0, each.share), 0) : "",
+                                 result.judgement.has_gap() ? fixed_text(100 * each.share, 0) : "",
                                  fixed_text(each.vote, 2)};
     const auto refined = std::find_if(result.refined.begin(), result.refined.end(),
                                       [&](const auto& other) { return other.judged == each.effect; });
     const bool is = refined != result.refined.end();
     row.push_back(is ? detail::components_text(refined->strength) : "");
     row.push_back(is ? fixed_text(refined->distance, 2) : "");
-    row.push_back(is ? fixed_text(100 * std::min(1.0, refined->share), 0) : "");
+    row.push_back(is ? fixed_text(100 * refined->share, 0) : "");
     table.add(row);
   }
   return table;

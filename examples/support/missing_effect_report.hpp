@@ -115,7 +115,7 @@ inline decant::BarChart candidates_chart(const Effects& effects, const decant::M
                                         [&](const auto& other) { return other.judged == each.effect; });
       chart.groups.push_back(effects.at(each.effect).name);
       chart.bars.front().heights.push_back(
-          100 * std::clamp(refined != result.refined.end() ? refined->share : each.share, 0.0, 1.0));
+          100 * std::max(0.0, refined != result.refined.end() ? refined->share : each.share));
     }
   }
   return chart;

@@ -53,8 +53,8 @@ struct EffectStanding {
   double distance = 0;                                ///< that is left then
   double improvement = 0;                             ///< of the distance
   double fall = 0;                                    ///< the same over what is left, see relative_fall
-  double share = 0;                                   ///< of what is reducible: the distance beyond chance's mean
-  double vote = 0;                                    ///< over all gaps, 1 for the best of each; no probability
+  double share = 0;  ///< of what is reducible: the distance beyond chance's mean; at most 1
+  double vote = 0;   ///< over all gaps, 1 for the best of each; no probability
 };
 
 /// What is answered.
@@ -205,7 +205,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
     one.improvement = profile.improvement() / count;
     one.distance = joint.distance - one.improvement;
     one.fall = relative_fall(joint.distance, one.distance);
-    one.share = one.improvement / std::max(joint.distance - chance.distance, 1e-12);
+    one.share = std::min(1.0, one.improvement / std::max(joint.distance - chance.distance, 1e-12));
     for (std::size_t component = 0; component < profile.components(); ++component) {
       one.interval.push_back(profile.within(component, std::max(chance.fall * one.distance, 1e-9) * count));
     }

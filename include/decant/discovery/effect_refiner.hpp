@@ -95,7 +95,7 @@ class EffectRefiner {
       }
       RefinedTogether one;
       one.distance = distance[k];
-      one.share = (before - one.distance) / std::max(before - known.chance.distance, 1e-12);
+      one.share = std::min(1.0, (before - one.distance) / std::max(before - known.chance.distance, 1e-12));
       const Eigen::VectorXd deviation =
           k == nearest ? deviations(points[k], candidates[k].views, known)
                        : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());

@@ -31,7 +31,7 @@ struct RefinedEffect {
   std::optional<Vector3<double>> place{};  ///< [m], where it was looked for
   std::optional<TimeWindow> window{};      ///< likewise
   double distance = 0;                     ///< that is left of the recordings it was found in
-  double share = 0;                        ///< of what is reducible
+  double share = 0;                        ///< of what is reducible, at most 1
 
   AppliedEffect applied() const { return {effect, strength, place, window}; }
   /// Strengths that hold the truth with 90 %, by component.
@@ -57,8 +57,8 @@ struct GapChange {
   double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
   double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
 
-  /// Of what is reducible.
-  double share() const noexcept { return (before - after) / std::max(before - noise, 1e-12); }
+  /// Of what is reducible, at most 1.
+  double share() const noexcept { return std::min(1.0, (before - after) / std::max(before - noise, 1e-12)); }
 };
 
 /// What was found.
