@@ -145,8 +145,9 @@ class EffectPoint {
 /// What a recording's simulations say around a point. Features are as they are, not standardised.
 struct RefinementView {
   const NuisanceSpace* space = nullptr;
-  Eigen::VectorXd middle{};  ///< at the point
-  Eigen::MatrixXd slope{};   ///< p x size of the point: what a change of one unit does
+  Eigen::VectorXd middle{};          ///< at the point
+  Eigen::MatrixXd slope{};           ///< p x size of the point: what a change of one unit does
+  Eigen::MatrixXd below{}, above{};  ///< p x size of the point: one step off in each of its numbers
 };
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings

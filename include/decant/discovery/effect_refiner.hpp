@@ -206,22 +206,46 @@ class EffectRefiner {
       recorded.push_back(each.recorded_features());
     }
     const Eigen::VectorXd move = refinement(candidate.point, candidate.views, recorded);
-    double before = 0;
-    candidate.expected = 0;
-    for (std::size_t k = 0; k < candidate.views.size(); ++k) {
-      const RefinementView& view = candidate.views[k];
-      const auto share = [&](const Eigen::VectorXd& off) {
-        return view.space->distance(view.space->standardised_difference(off)) /
-               static_cast<double>(candidate.views.size());
-      };
-      before += share(recorded[k] - view.middle);
-      candidate.expected += share(recorded[k] - view.middle - view.slope * move);
+    const auto mean_distance = [&](const auto& off) {
+      double sum = 0;
+      for (std::size_t k = 0; k < candidate.views.size(); ++k) {
+        const NuisanceSpace& space = *candidate.views[k].space;
+        sum += space.distance(space.standardised_difference(off(candidate.views[k], recorded[k])));
+      }
+      return sum / static_cast<double>(candidate.views.size());
+    };
+    using View = RefinementView;
+    using Features = Eigen::VectorXd;
+    const double before =
+        mean_distance([](const View& view, const Features& own) -> Features { return own - view.middle; });
+    candidate.expected = mean_distance(
+        [&](const View& view, const Features& own) -> Features { return own - view.middle - view.slope * move; });
+    EffectPoint next = candidate.point;
+    for (Eigen::Index k = 0; k < next.size(); ++k) {
+      next = next.with(k, candidate.point.value()[k] + move[k]);
+    }
+    // where what an effect does is bent, a point that was tried may be nearer than what slopes promise; what fewer
+    // runs' mean is off by more through their chaos is taken off
+    double chaotic = 0;
+    for (const RecordedEvidence& each : known.recorded) {
+      chaotic += each.chaos() / static_cast<double>(known.recorded.size());
+    }
+    const double more =
+        chaotic / static_cast<double>(slope_seeds(candidate.point)) - chaotic / static_cast<double>(middle_seeds());
+    for (Eigen::Index number = 0; number < next.size(); ++number) {
+      for (const int side : {-1, 1}) {
+        const double there = mean_distance([&](const View& view, const Features& own) -> Features {
+                               return own - (side < 0 ? view.below : view.above).col(number);
+                             }) -
+                             more;
+        if (there > 0 && relative_fall(candidate.expected, there) > known.chance.fall) {
+          candidate.expected = there;
+          next = candidate.point.with(number, candidate.point.value()[number] + side * candidate.point.step(number));
+        }
+      }
     }
     candidate.settled = relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
-    const Eigen::VectorXd value = candidate.point.value() + move;
-    for (Eigen::Index k = 0; k < candidate.point.size(); ++k) {
-      candidate.point = candidate.point.with(k, value[k]);
-    }
+    candidate.point = next;
   }
 
   /// @param seen of runs at the point, then below and above of each of its numbers.
@@ -233,7 +257,8 @@ class EffectRefiner {
     if (!middle) {
       return std::nullopt;
     }
-    RefinementView view{&recorded.space(), *middle, Eigen::MatrixXd(middle->size(), point.size())};
+    const Eigen::MatrixXd none(middle->size(), point.size());
+    RefinementView view{&recorded.space(), *middle, none, none, none};
     for (Eigen::Index k = 0; k < point.size(); ++k) {
       const auto below = recorded.mean_features({seen, seeds});
       seen += seeds;
@@ -245,6 +270,8 @@ class EffectRefiner {
         return std::nullopt;
       }
       view.slope.col(k) = (*above - *below) / apart;
+      view.below.col(k) = *below;
+      view.above.col(k) = *above;
     }
     return view;
   }
