@@ -50,6 +50,16 @@ TEST_CASE("effect point: strengths, places and times of several effects are one 
   CHECK(point.value() == numbers({1.5, 20, 0.11, 0.2, 0.3, 0.9, 0.4, -0.3, 0.5, 1.5}));
   CHECK(point.strength_of(2) == std::pair<Eigen::Index, Eigen::Index>{6, 2});
 
+  // to where sums' last digits do not matter, also beyond what is looked through
+  const auto nudged = [&](double by) {
+    EffectPoint result;
+    result.add(tap, 3, {3, numbers({20 + by}), Vector3<double>(0.9 + by, 0.2, 0.3), TimeWindow{.from = 0.9 - by}});
+    return result.rounded().value();
+  };
+  CHECK(nudged(1e-13) == nudged(0));
+  CHECK((nudged(0) - numbers({20, 0.9, 0.2, 0.3, 0.9})).cwiseAbs().maxCoeff() < 1e-5);
+  CHECK(nudged(1e-3) != nudged(0));
+
   // what is asked for is what comes back
   const EffectPoint other = point.with(5, 1.2).with(9, 1.65).with(3, 0.23);
   const AppliedEffect of_tap = other.applied(1), of_gust = other.applied(2);

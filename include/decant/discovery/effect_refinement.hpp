@@ -111,6 +111,18 @@ class EffectPoint {
     return other;
   }
 
+  /// With all numbers as multiples of a ten-millionth of their range. Sums differ in their last digit with where memory
+  /// lies; a search that goes on from a journal has to ask for the very runs that it has.
+  EffectPoint rounded() const {
+    EffectPoint other = *this;
+    for (Eigen::Index k = 0; k < size(); ++k) {
+      const auto [low, high] = range(k);
+      const double grid = 1e-7 * (high - low);
+      other.value_[k] = grid > 0 ? grid * std::round(value_[k] / grid) : value_[k];
+    }
+    return other;
+  }
+
   ModelRun run(std::uint32_t seed) const {
     ModelRun result{{}, seed, false};
     for (std::size_t part = 0; part < parts_.size(); ++part) {

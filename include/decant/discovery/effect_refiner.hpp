@@ -68,6 +68,7 @@ class EffectRefiner {
           point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
         }
         point.add(effect, number, {number, standing.strength, {}});
+        point = point.rounded();
       }
     }
     const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
@@ -245,7 +246,7 @@ class EffectRefiner {
       }
     }
     candidate.settled = relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
-    candidate.point = next;
+    candidate.point = next.rounded();
   }
 
   /// @param seen of runs at the point, then below and above of each of its numbers.
