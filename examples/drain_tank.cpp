@@ -2,9 +2,11 @@
 // The discharge coefficient of a hole through which a tank drains, from a recording of its level, without particles:
 //   drain_tank FOLDER --json OUT.json --report OUT.html
 // The folder is that of G. Fabusola and C. M. Simon, Chem. Eng. Sci. 309 (2025) 121488, with
-// liq_level_data_empty_train.csv and level_sensor_calibration.csv. With --assumed 0.8, also what a model lacks that
-// takes the coefficient for that: the search for missing effects, on a model without particles and cameras. Exit status
-// 0: done; 2: a file or an argument is wrong.
+// liq_level_data_empty_train.csv and level_sensor_calibration.csv.
+// With --assumed 0.8, also what a model lacks that takes the coefficient for that: the search for missing effects, on a
+// model without particles and cameras.
+//
+// Exit status 0: done; 2: a file or an argument is wrong.
 
 #include <algorithm>
 #include <cmath>
@@ -80,7 +82,7 @@ std::vector<double> in(double unit, const std::vector<double>& values) {
 }
 
 std::string diagnosis_text(const example::DrainDiagnosis& diagnosis) {
-  return example::missing_effect_sentence(diagnosis.effects, diagnosis.result) +
+  return example::missing_effect_sentence(diagnosis.result.judged, diagnosis.result) +
          " Levels of the second half, which was not learnt from, are off by " +
          fixed_text(1e3 * diagnosis.off_before, 1) + " mm as assumed, and by " +
          fixed_text(1e3 * diagnosis.off_after, 1) + " mm with what was found.";
@@ -133,7 +135,7 @@ void write_report(const std::string& file, const std::vector<Answer>& answers, c
     report.heading("What a model lacks that assumes a coefficient");
     report.paragraph(diagnosis_text(*diagnosis));
     report.table(example::gap_table(diagnosis->result));
-    report.table(example::candidates_table(diagnosis->effects, diagnosis->result));
+    report.table(example::candidates_table(diagnosis->result.judged, diagnosis->result));
     report.table(example::where_read_table({"first half"}, {{"level"}}, diagnosis->result));
     report.chart({"Level by that model; the second half begins anew where it was read",
                   "time [s]",
@@ -171,12 +173,13 @@ int main(int count, char** values) {
     if (assumed) {
       diagnosis = example::diagnose_drain(tank, record, *assumed, threads);
       std::printf("%s\n%s", diagnosis_text(*diagnosis).c_str(),
-                  example::candidates_table(diagnosis->effects, diagnosis->result).text().c_str());
+                  example::candidates_table(diagnosis->result.judged, diagnosis->result).text().c_str());
     }
     if (!json_file.empty()) {
       nlohmann::json json = to_json(answers, record);
       if (diagnosis) {
-        json["missing"] = example::missing_effect_json(diagnosis->effects, diagnosis->result, {0, 0, -tank.gravity});
+        json["missing"] =
+            example::missing_effect_json(diagnosis->result.judged, diagnosis->result, {0, 0, -tank.gravity});
         json["missing"]["held_out_level_off_m"] = {{"before", diagnosis->off_before}, {"after", diagnosis->off_after}};
       }
       example::write_result(json_file, json);

@@ -38,13 +38,8 @@ class DrainingTankModel {
     using decant::EffectKind;
     const auto add = [&](const char* name, const char* unit, const char* meaning, const decant::EffectComponent& of,
                          EffectKind kind = EffectKind::Physics) {
-      decant::Effect effect;
-      effect.name = name;
-      effect.unit = unit;
-      effect.meaning = meaning;
-      effect.components = {of};
-      effect.kind = kind;
-      effects_.push_back(std::move(effect));
+      effects_.push_back(decant::plain_effect(name, "", unit, meaning, of));
+      effects_.back().kind = kind;
     };
     add("discharge", "", "the hole lets another share of what Torricelli's law says pass",
         {"", discharge, discharge - 0.25, discharge + 0.25});
@@ -61,14 +56,8 @@ class DrainingTankModel {
   std::vector<decant::ReadingSeries> predict(const decant::ModelRun& run) const {
     std::mt19937 random(run.seed);
     std::vector<double> strength;
-    for (const decant::Effect& effect : effects_) {
-      const double share = static_cast<double>(random()) / 2147483648.0 - 1;
-      strength.push_back(effect.components[0].base + (run.tolerated ? share * effect.components[0].tolerance : 0));
-    }
-    for (const decant::AppliedEffect& each : run.effects) {
-      decant::expects(each.effect < effects_.size() && each.strength.size() == 1, "DrainingTankModel: effect",
-                      "one of the model's, with one number", each.effect);
-      strength[each.effect] = each.strength[0];
+    for (const decant::AppliedEffect& each : decant::effects_of_run(effects_, run, random)) {
+      strength.push_back(each.strength[0]);
     }
     const std::vector<double> levels = level(strength);
     decant::ReadingSeries series("level [m]", error_);
@@ -114,7 +103,6 @@ static_assert(decant::ForwardModel<DrainingTankModel>);
 
 /// What a tank's model lacks that assumes some discharge coefficient.
 struct DrainDiagnosis {
-  std::vector<decant::Effect> effects{};
   decant::MissingEffect result{};
   std::vector<double> assumed{}, mended{};  ///< levels by the model as it is, and with what was found [m]
   double off_before = 0, off_after = 0;     ///< mean size of what they are off by, where it was not learnt from [m]
@@ -149,7 +137,6 @@ inline DrainDiagnosis diagnose_drain(const DrainingTank& tank, const DrainRecord
       MissingEffectSearch<DrainingTankModel>({{"first half", &first, first_read}},
                                              {{"second half", &second, second_read}}, run_jobs_on(executor), settings)
           .find();
-  diagnosis.effects = diagnosis.result.judged;
   ModelRun with;
   for (const RefinedEffect& each : diagnosis.result.found) {
     with.effects.push_back(each.applied());

@@ -168,10 +168,10 @@ inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std:
 }
 
 /// The catalogue, as far as it applies to a recording.
-inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording) {
+inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording,
+                                                                        const PourPlaces& places) {
   using namespace decant;
   auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density, recording.gravity);
-  const PourPlaces places = pour_places(recording);
   const Vector3<double> up = -recording.gravity.normalized();
   const auto [across, along] = level_directions(recording.gravity);
   const double aside = 0.08;  // [m]
@@ -320,7 +320,7 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     tracking.initial_amount_factor = fill;
     return model_of<EffectParts<float>>(*start_of, tracking);
   };
-  auto catalogue = detail::catalogue_of(recording);
+  auto catalogue = detail::catalogue_of(recording, places);
   for (const auto& [name, tolerance] : options.tolerances) {
     bool found = false;
     for (auto& effect : catalogue) {

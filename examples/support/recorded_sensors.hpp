@@ -23,6 +23,7 @@
 #include <decant/simulation/gauges.hpp>
 
 #include "pour_places.hpp"
+#include "stands_within.hpp"
 
 namespace example {
 
@@ -48,20 +49,6 @@ inline std::vector<double> averaged(const std::vector<double>& at, const std::ve
     result.push_back(count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN());
   }
   return result;
-}
-
-/// Whether there is something solid within a length below a point.
-template <class Model>
-bool stands_within(const Model& model, const decant::Vector3<double>& x, double length) {
-  const decant::Vector3<double> below = x - decant::Vector3<double>(0, 0, length);
-  for (std::size_t k = 0; k < model.bodies().size(); ++k) {
-    const auto& body = model.bodies()[static_cast<decant::BodyId>(k)];
-    const decant::Pose body_from_world = body.motion.at(model.time()).inverse();
-    if (body.surface->any_hit(body_from_world * x, body_from_world * below)) {
-      return true;
-    }
-  }
-  return false;
 }
 
 }  // namespace detail
@@ -97,18 +84,22 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
       throw std::runtime_error("error of '" + channel + "': expected a number above 0");
     }
   }
-  std::vector<std::pair<std::size_t, std::shared_ptr<const Cavity>>> targets;
-  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
-    if (recording.bodies[body].role == recording::Role::Target && places.inside.at(body)) {
-      const auto surface = std::make_shared<const BoundingVolumeHierarchy>(recording.bodies[body].mesh);
-      targets.emplace_back(body, std::make_shared<const Cavity>(surface, places.inside[body]->up));
+  // containers whose liquid a scale weighs; made where there is one
+  const auto weighed = [&] {
+    std::vector<std::pair<BodyId, std::shared_ptr<const Cavity>>> targets;
+    for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+      if (recording.bodies[body].role == recording::Role::Target && places.inside.at(body)) {
+        const auto surface = std::make_shared<const BoundingVolumeHierarchy>(recording.bodies[body].mesh);
+        targets.emplace_back(static_cast<BodyId>(body),
+                             std::make_shared<const Cavity>(surface, places.inside[body]->up));
+      }
     }
-  }
+    return targets;
+  };
   std::vector<InteractionSensor<Model>> sensors;
   std::vector<ReadingSeries> readings;
   for (const recording::Channel& channel : recording.measurements.channels) {
-    const bool mass = channel.quantity == Quantity::TargetMass;
-    if (channel.quantity == Quantity::Other || (mass && targets.empty())) {
+    if (channel.quantity == Quantity::Other) {
       continue;
     }
     const std::vector<double> values = detail::averaged(recording.measurements.times, channel.values, times);
@@ -133,22 +124,22 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
       return of;
     };
     const Vector3<double> at = channel.place;
-    if (mass) {
-      sensor.read = [targets](Model& model) {
-        double sum = 0;
-        const auto& fluid = model.fluid();
+    if (channel.quantity == Quantity::TargetMass) {
+      const auto targets = weighed();
+      if (targets.empty()) {
+        continue;
+      }
+      sensor.read = [gauges, targets](Model& model) {
+        const Gauges<Scalar> of = gauges(model);
+        double volume = 0;
         for (const auto& [body, cavity] : targets) {
-          const Pose body_from_world = model.bodies()[static_cast<BodyId>(body)].motion.at(model.time()).inverse();
-          for (Index i = 0; i < fluid.size(); ++i) {
-            const bool inside = cavity->contains(body_from_world * fluid.position.col(i).template cast<double>());
-            sum += inside ? static_cast<double>(fluid.mass[i]) : 0;
-          }
+          volume += of.volume_in(*cavity, model.bodies()[body].motion.at(model.time()));
         }
-        return sum;
+        return model.settings().liquid.density * volume;
       };
     } else if (channel.quantity == Quantity::Level) {
       sensor.read = [gauges, at, least](Model& model) {
-        const auto stands = [&](const auto& x) { return detail::stands_within(model, x, 1.5 * model.spacing()); };
+        const auto stands = [&](const auto& x) { return stands_within(model, x, 1.5 * model.spacing()); };
         return gauges(model).level(at.x(), at.y(), stands).value_or(least);
       };
     } else if (channel.quantity == Quantity::Front) {

@@ -37,6 +37,8 @@
 #include <decant/simulation/gauges.hpp>
 #include <decant/simulation/simulator.hpp>
 
+#include "stands_within.hpp"
+
 namespace example {
 
 /// What a run is to leave behind besides its series.
@@ -335,7 +337,8 @@ class SceneRun {
     gauges_.observe(simulator_.fluid(), {options_.threads});
     for (const decant::scene::Gauge& gauge : scene_.gauges) {
       if (const auto* level = std::get_if<decant::scene::LevelGauge>(&gauge.kind)) {
-        const auto height = gauges_.level(level->x, level->y, [this](const auto& x) { return stands(x); });
+        const auto height = gauges_.level(
+            level->x, level->y, [this](const auto& x) { return stands_within(simulator_, x, 1.5 * scene_.spacing); });
         row.push_back(height ? 1e3 * *height : none);
       } else if (std::holds_alternative<decant::scene::FrontGauge>(gauge.kind)) {
         const auto front = gauges_.front();
@@ -387,18 +390,6 @@ class SceneRun {
       next_picture_ = time + std::max(scene_.end / options_.most_pictures, 1 / scene_.record_rate);
       paint(time);
     }
-  }
-
-  // Something solid within 1.5 spacings below x.
-  bool stands(const decant::Vector3<double>& x) const {
-    for (std::size_t b = 0; b < simulator_.bodies().size(); ++b) {
-      const decant::Pose body_from_world = pose_of(b).inverse();
-      const decant::Vector3<double> below = x - decant::Vector3<double>(0, 0, 1.5 * scene_.spacing);
-      if (simulator_.bodies()[id(b)].surface->any_hit(body_from_world * x, body_from_world * below)) {
-        return true;
-      }
-    }
-    return false;
   }
 
   // Particles that are in no container, where there is one.

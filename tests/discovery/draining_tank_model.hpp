@@ -65,12 +65,8 @@ class TankModel {
   explicit TankModel(double level = 0.2) : level_(level) {
     const auto add = [&](const char* name, const char* unit, const decant::EffectComponent& component,
                          decant::EffectKind kind) {
-      decant::Effect effect;
-      effect.name = name;
-      effect.unit = unit;
-      effect.components = {component};
-      effect.kind = kind;
-      effects_.push_back(effect);
+      effects_.push_back(decant::plain_effect(name, "", unit, "", component));
+      effects_.back().kind = kind;
     };
     add("discharge", "", {"", 0.62, 0.4, 0.9}, decant::EffectKind::Physics);
     add("leak", "m^3/s", {"", 0, 0, 4e-6}, decant::EffectKind::Physics);
@@ -83,12 +79,8 @@ class TankModel {
   std::vector<decant::ReadingSeries> predict(const decant::ModelRun& run) const {
     std::mt19937 random(run.seed);
     std::vector<double> strength;
-    for (const decant::Effect& effect : effects_) {
-      const double share = static_cast<double>(random()) / 2147483648.0 - 1;
-      strength.push_back(effect.components[0].base + (run.tolerated ? share * effect.components[0].tolerance : 0));
-    }
-    for (const decant::AppliedEffect& applied : run.effects) {
-      strength.at(applied.effect) = applied.strength[0];
+    for (const decant::AppliedEffect& each : decant::effects_of_run(effects_, run, random)) {
+      strength.push_back(each.strength[0]);
     }
     return readings_of({strength[0], strength[2], strength[1], strength[3]});
   }

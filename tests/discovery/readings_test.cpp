@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -304,4 +305,49 @@ TEST_CASE("readings: cameras and a scale together tell what either does not") {
   CHECK(found({}, 1.15) == "density");
   CHECK(found({0.5}, 1) == "drag");
   CHECK(found({0, 0, 1.06}, 1) == "speed");
+}
+
+namespace {
+
+/// A probe that a wave passes. When it does is the effect's place; before and after it is calm.
+class WaveModel {
+ public:
+  WaveModel() : effects_{plain_effect("wave", "", "mm", "", {"", 0, 0, 10})} {
+    effects_[0].place = Vector3<double>(20, 0, 0);
+    effects_[0].place_tolerance = 20;
+  }
+
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+
+  std::vector<ReadingSeries> predict(const ModelRun& run) const {
+    std::mt19937 random(run.seed);
+    const AppliedEffect wave = effects_of_run(effects_, run, random)[0];
+    return {passing((*wave.place)[0], wave.strength[0])};
+  }
+
+  static ReadingSeries passing(double at, double height) {
+    ReadingSeries series("height [mm]", {0.3, 0});
+    for (int k = 0; k < 60; ++k) {
+      series.add(k, height / (1 + std::pow((k - at) / 3, 2)));
+    }
+    return series;
+  }
+
+ private:
+  std::vector<Effect> effects_;
+};
+static_assert(ForwardModel<WaveModel>);
+
+}  // namespace
+
+TEST_CASE("refinement: a point that was tried is taken where slopes promise less") {
+  // the wave is nowhere near its usual place, and slopes there say little of what it does where it is
+  const WaveModel model;
+  ThreadExecutor executor{{1}};
+  const Observation seen = Observation({WaveModel::passing(35, 8)}).with_errors(7);
+  const MissingEffect result = MissingEffectSearch<WaveModel>({{"a", &model, seen}}, {}, run_jobs_on(executor)).find();
+  REQUIRE(!result.refined.empty());
+  REQUIRE(result.refined.front().place);
+  CHECK(result.refined.front().place->x() == Approx(35).margin(0.5));
+  CHECK(result.refined.front().strength[0] == Approx(8).epsilon(0.1));
 }

@@ -154,7 +154,7 @@ TEST_CASE("draining tank: a wrong coefficient is named from the first half, and 
     record.level.push_back(level_after(tank, 0.26, 0.66, 2.0 * k) + off);
   }
   const auto name = [](const DrainDiagnosis& diagnosis) {
-    return diagnosis.effects[diagnosis.result.found.front().effect].name;
+    return diagnosis.result.judged[diagnosis.result.found.front().effect].name;
   };
   const DrainDiagnosis wrong = diagnose_drain(tank, record, 0.85);
   CHECK(wrong.result.verdict == decant::Verdict::Named);
@@ -188,7 +188,7 @@ TEST_CASE(
     const DrainDiagnosis diagnosis = diagnose_drain(tank_fabusola2025(), record, assumed);
     REQUIRE(diagnosis.result.found.size() == 1);
     CHECK(diagnosis.result.verdict == decant::Verdict::Named);
-    CHECK(diagnosis.effects[diagnosis.result.found.front().effect].name == "discharge");
+    CHECK(diagnosis.result.judged[diagnosis.result.found.front().effect].name == "discharge");
     const auto [low, high] = diagnosis.result.found.front().interval_90(0);
     CHECK(low < 0.680);  // Fabusola and Simon 2025
     CHECK(high > 0.680);

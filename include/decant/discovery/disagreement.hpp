@@ -21,6 +21,20 @@
 
 namespace decant::inline DECANT_TARGET {
 
+namespace detail {
+
+/// So many together disagree already from this share of the threshold on: chance hardly puts them side by side.
+inline constexpr std::size_t many_together = 4;
+inline constexpr double low_threshold = 0.75;
+
+inline void check_deviations(std::size_t features, const Eigen::VectorXd& off, double threshold) {
+  expects(off.size() == static_cast<Eigen::Index>(features), "find_disagreements: deviations", "as many as features",
+          off.size());
+  expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
+}
+
+}  // namespace detail
+
 /// Squares of the picture that touch each other in space and time, in all of which there is more liquid than expected,
 /// or less. Where it begins points at the cause; where most of it is, at the consequence.
 struct Disagreement {
@@ -42,11 +56,8 @@ struct Disagreement {
 /// Throws std::invalid_argument if there are not as many as features, or the threshold is out of range.
 inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& features, const Eigen::VectorXd& off,
                                                     double threshold = 4) {
-  expects(off.size() == static_cast<Eigen::Index>(features.size()), "find_disagreements: deviations",
-          "as many as features", off.size());
-  expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
-  constexpr std::size_t many = 4;
-  const double low = 0.75 * threshold;
+  detail::check_deviations(features.size(), off, threshold);
+  const double low = detail::low_threshold * threshold;
   using Key = std::array<int, 4>;  // camera, window, row, column
   std::map<Key, std::size_t> beyond;
   for (std::size_t k = 0; k < features.size(); ++k) {
@@ -102,7 +113,7 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     }
     one.onset_u /= total;
     one.onset_v /= total;
-    if (one.largest > threshold || one.squares >= many) {
+    if (one.largest > threshold || one.squares >= detail::many_together) {
       found.push_back(one);
     }
   }
@@ -124,16 +135,13 @@ struct ReadingDisagreement {
 /// quarters of the threshold on.
 inline std::vector<ReadingDisagreement> find_disagreements(const ReadingFeatures& features, const Eigen::VectorXd& off,
                                                            double threshold = 4) {
-  expects(off.size() == static_cast<Eigen::Index>(features.size()), "find_disagreements: deviations",
-          "as many as features", off.size());
-  expects(threshold > 0, "find_disagreements: threshold", "> 0", threshold);
-  constexpr std::size_t many = 4;
+  detail::check_deviations(features.size(), off, threshold);
   std::vector<ReadingDisagreement> found;
   for (std::size_t k = 0; k < features.size();) {
     const auto size_of = [&](std::size_t feature) { return off[static_cast<Eigen::Index>(feature)]; };
     ReadingDisagreement one{features.place(k).sensor, size_of(k) > 0, features.place(k).begin};
     while (k < features.size() && features.place(k).sensor == one.sensor &&
-           (one.more ? size_of(k) : -size_of(k)) > 0.75 * threshold) {
+           (one.more ? size_of(k) : -size_of(k)) > detail::low_threshold * threshold) {
       one.end = features.place(k).end;
       one.weight += size_of(k) * size_of(k);
       one.largest = std::max(one.largest, std::abs(size_of(k)));
@@ -142,7 +150,7 @@ inline std::vector<ReadingDisagreement> find_disagreements(const ReadingFeatures
     }
     if (one.windows == 0) {
       ++k;
-    } else if (one.largest > threshold || one.windows >= many) {
+    } else if (one.largest > threshold || one.windows >= detail::many_together) {
       found.push_back(one);
     }
   }

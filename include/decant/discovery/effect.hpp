@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -79,6 +80,19 @@ struct Effect {
     return result;
   }
 };
+
+/// One whose strength is one number, and which is in no particular place.
+inline Effect plain_effect(std::string name, std::string family, std::string unit, std::string meaning,
+                           const EffectComponent& component, std::string code = {}) {
+  Effect effect;
+  effect.name = std::move(name);
+  effect.family = std::move(family);
+  effect.unit = std::move(unit);
+  effect.meaning = std::move(meaning);
+  effect.components = {component};
+  effect.code = std::move(code);
+  return effect;
+}
 
 /// Throws std::invalid_argument if something is missing or out of range.
 inline void validate(const Effect& effect) {

@@ -74,7 +74,7 @@ class EffectRefiner {
     const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
     for (int round = 0; round < most && !candidates.empty(); ++round) {
       if (round >= settings_.refinement_rounds) {
-        leave_best_unsettled(candidates);
+        settle_others(candidates);
       }
       // none that distances are measured with
       step_all(candidates, known, static_cast<std::uint32_t>((round < 3 ? 5001 : 10001) + 1000 * round));
@@ -146,9 +146,9 @@ class EffectRefiner {
     });
   }
 
-  /// What is far from where it is looked for first takes more steps than others, and what it has not got to by then
-  /// would be another effect's to explain.
-  static void leave_best_unsettled(std::vector<Candidate>& candidates) {
+  /// Only the best one goes on. What is far from where it is looked for first takes more steps than others, and what it
+  /// has not got to by then would be another effect's to explain.
+  static void settle_others(std::vector<Candidate>& candidates) {
     const auto best = std::min_element(candidates.begin(), candidates.end(),
                                        [](const auto& a, const auto& b) { return a.expected < b.expected; });
     for (auto each = candidates.begin(); each != candidates.end(); ++each) {
@@ -258,8 +258,10 @@ class EffectRefiner {
     if (!middle) {
       return std::nullopt;
     }
-    const Eigen::MatrixXd none(middle->size(), point.size());
-    RefinementView view{&recorded.space(), *middle, none, none, none};
+    RefinementView view{&recorded.space(), *middle};
+    for (Eigen::MatrixXd* each : {&view.slope, &view.below, &view.above}) {
+      each->resize(middle->size(), point.size());
+    }
     for (Eigen::Index k = 0; k < point.size(); ++k) {
       const auto below = recorded.mean_features({seen, seeds});
       seen += seeds;

@@ -4,15 +4,18 @@
 /// What predicts an interaction as cameras would see it and sensors read it, with effects that the model may lack: a
 /// liquid simulator, or anything else.
 
+#include <algorithm>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <random>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/discovery/effect.hpp>
@@ -34,6 +37,44 @@ struct ModelRun {
   std::uint32_t seed = 0;                ///< of what chaos decides: runs of different seeds differ as two pours do
   bool tolerated = false;                ///< the seed draws all that is tolerated, too: see EffectComponent
 };
+
+namespace detail {
+
+/// 0 .. 1, evenly.
+inline double unit_draw(std::mt19937& random) { return static_cast<double>(random()) / 4294967295.0; }
+
+}  // namespace detail
+
+/// What a model has to do in a run, for those who write one: all effects in the order of the model's, each as the run
+/// asks for it, or else as the model has it; where all that is tolerated is drawn, evenly within its tolerance.
+/// Throws std::invalid_argument for an effect that there is not, or another number of components.
+/// @param random begun with the run's seed.
+inline std::vector<AppliedEffect> effects_of_run(const std::vector<Effect>& effects, const ModelRun& run,
+                                                 std::mt19937& random) {
+  std::vector<AppliedEffect> as;
+  for (const Effect& effect : effects) {
+    as.push_back({as.size(), effect.base(), effect.place, effect.window});
+    for (std::size_t component = 0; component < effect.components.size(); ++component) {
+      const EffectComponent& of = effect.components[component];
+      if (run.tolerated && of.tolerance > 0 && effect.kind != EffectKind::Nuisance) {
+        as.back().strength[static_cast<Eigen::Index>(component)] =
+            std::clamp(of.base + (2 * detail::unit_draw(random) - 1) * of.tolerance, of.low, of.high);
+      }
+    }
+  }
+  for (const AppliedEffect& applied : run.effects) {
+    expects(applied.effect < effects.size(), "ModelRun: effect", "one of the model's", applied.effect);
+    const Effect& effect = effects[applied.effect];
+    expects(
+        applied.strength.size() == static_cast<Eigen::Index>(effect.components.size()) && applied.strength.allFinite(),
+        "ModelRun: strength of '" + effect.name + "'", "a finite number for each component", applied.strength.size());
+    AppliedEffect& own = as[applied.effect];
+    own.strength = applied.strength;
+    own.place = applied.place ? applied.place : own.place;
+    own.window = applied.window ? applied.window : own.window;
+  }
+  return as;
+}
 
 /// Something that a camera saw.
 struct Sighting {

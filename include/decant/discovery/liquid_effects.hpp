@@ -92,18 +92,6 @@ InteractionEffect<Model> force_effect(Effect effect, Set set) {
 namespace detail {
 
 /// Effect with one component.
-inline Effect plain_effect(std::string name, std::string family, std::string unit, std::string meaning,
-                           const EffectComponent& component, std::string code) {
-  Effect effect;
-  effect.name = std::move(name);
-  effect.family = std::move(family);
-  effect.unit = std::move(unit);
-  effect.meaning = std::move(meaning);
-  effect.components = {component};
-  effect.code = std::move(code);
-  return effect;
-}
-
 template <class Model, class Apply>
 InteractionEffect<Model> run_effect(Effect effect, EffectKind kind, Apply apply) {
   InteractionEffect<Model> result;
@@ -147,7 +135,6 @@ template <class Model>
 std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
                                                     const Vector3<double>& gravity = {0, 0, -9.81}) {
   using Scalar = typename Model::Scalar;
-  using detail::plain_effect;
   std::vector<InteractionEffect<Model>> effects;
   effects.push_back(force_effect<LinearDrag<Scalar>, Model>(
       plain_effect("drag_linear", "drag", "1/s", "air slows the liquid in proportion to its speed", {"", 0, 0, 4},
@@ -213,11 +200,11 @@ template <class Model>
 InteractionEffect<Model> passing_force_effect(const TimeWindow& window, double tolerance, std::string where,
                                               const Vector3<double>& gravity = {0, 0, -9.81}) {
   using Scalar = typename Model::Scalar;
-  Effect effect = detail::plain_effect(
-      "lateral_force", "", "m/s^2", "something pulls the liquid sideways for a while, such as a gust",
-      {"x", 0, -1.2, 1.2},
-      "auto& pull = simulator.force<BodyAcceleration<float>>(); pull.pull = @ * level[0] + @ * level[1]; "
-      "pull.from = ~; pull.until = ~;");
+  Effect effect =
+      plain_effect("lateral_force", "", "m/s^2", "something pulls the liquid sideways for a while, such as a gust",
+                   {"x", 0, -1.2, 1.2},
+                   "auto& pull = simulator.force<BodyAcceleration<float>>(); pull.pull = @ * level[0] + @ * level[1]; "
+                   "pull.from = ~; pull.until = ~;");
   effect.components.push_back({"y", 0, -1.2, 1.2});
   effect.window = window;
   effect.window_tolerance = tolerance;
@@ -229,7 +216,7 @@ InteractionEffect<Model> passing_force_effect(const TimeWindow& window, double t
 template <class Model>
 InteractionEffect<Model> suction_effect(const Vector3<double>& place, std::string where) {
   using Scalar = typename Model::Scalar;
-  Effect effect = detail::plain_effect(
+  Effect effect = plain_effect(
       "suction", "", "m/s^2", "something draws the liquid toward a point (its strength is that at 5 cm)",
       {"", 0, 0, 12}, "auto& suction = simulator.force<Suction<float>>(); suction.strength = @; suction.point = {#};");
   effect.place = place;
@@ -257,9 +244,8 @@ inline std::vector<std::pair<double, double>> steady(double millilitres_per_seco
 template <class Model>
 InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, const Vector3<double>& below,
                                      std::string where) {
-  Effect effect =
-      detail::plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
-                           "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
+  Effect effect = plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
+                               "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
   effect.place_tolerance = 0.02;
   effect.seen_first = SeenFirst::Liquid;
@@ -287,9 +273,9 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
 /// place that the container is within [m].
 template <class Model>
 InteractionEffect<Model> loss_effect(BodyId body, const Vector3<double>& place, double radius, std::string where) {
-  Effect effect = detail::plain_effect("loss", "", "ml/s", "liquid disappears little by little", {"", 0, 0, 40},
-                                       "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * "
-                                       "@}}, OutletOrder::Evenly});");
+  Effect effect = plain_effect("loss", "", "ml/s", "liquid disappears little by little", {"", 0, 0, 40},
+                               "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * "
+                               "@}}, OutletOrder::Evenly});");
   effect.place = place;
   effect.where = std::move(where);
   return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
@@ -309,9 +295,8 @@ InteractionEffect<Model> loss_effect(BodyId body, const Vector3<double>& place, 
 template <class Model>
 InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin origin, std::string where,
                                        const TimeWindow& window = {}, double window_tolerance = 0) {
-  Effect effect =
-      detail::plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
-                           "simulator.add_inlet({{#}, down, radius, {{~, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
+  Effect effect = plain_effect("inflow", "", "ml/s", "liquid comes in from elsewhere", {"", 0, 0, 40},
+                               "simulator.add_inlet({{#}, down, radius, {{~, 1e-6 * @}, {60, 1e-6 * @}}}, origin);");
   effect.place = place;
   effect.seen_first = SeenFirst::Falling;
   effect.where = std::move(where);
@@ -336,9 +321,9 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
 /// the body's frame [m]. @param where in words.
 template <class Model>
 InteractionEffect<Model> obstacle_effect(BodyId body, const Vector3<double>& place, std::string where) {
-  Effect effect = detail::plain_effect("obstacle", "", "m", "something solid is in the way (its strength is its size)",
-                                       {"", 0, 0, 0.03},
-                                       "simulator.add_body(\"obstacle\", cube at {#} of edge @, motion_of_container);");
+  Effect effect =
+      plain_effect("obstacle", "", "m", "something solid is in the way (its strength is its size)", {"", 0, 0, 0.03},
+                   "simulator.add_body(\"obstacle\", cube at {#} of edge @, motion_of_container);");
   effect.place = place;
   effect.seen_first = SeenFirst::Either;
   effect.where = std::move(where);
@@ -369,10 +354,10 @@ template <class Model>
 InteractionEffect<Model> back_pressure_effect(const Neck& neck, std::string where) {
   using Scalar = typename Model::Scalar;
   Effect effect =
-      detail::plain_effect("back_pressure", "", "m/s^2",
-                           "air cannot get in as fast as liquid wants to get out (a bottle that glugs)", {"", 0, 0, 8},
-                           "auto& air = simulator.force<BackPressure<float>>(); air.strength = @; air.mouth "
-                           "= {#}; air.container = motion_of_container;");
+      plain_effect("back_pressure", "", "m/s^2",
+                   "air cannot get in as fast as liquid wants to get out (a bottle that glugs)", {"", 0, 0, 8},
+                   "auto& air = simulator.force<BackPressure<float>>(); air.strength = @; air.mouth "
+                   "= {#}; air.container = motion_of_container;");
   effect.place = neck.mouth;
   effect.where = std::move(where);
   return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
@@ -393,8 +378,8 @@ InteractionEffect<Model> back_pressure_effect(const Neck& neck, std::string wher
 template <class Model>
 InteractionEffect<Model> fill_effect(double most = 1.25) {
   return detail::run_effect<Model>(
-      detail::plain_effect("fill", "", "", "there is more or less liquid than assumed (over what is assumed)",
-                           {"", 1, 0.75, most, 0.02}, "fill(simulator, container, FillAmount::fraction(@ * assumed));"),
+      plain_effect("fill", "", "", "there is more or less liquid than assumed (over what is assumed)",
+                   {"", 1, 0.75, most, 0.02}, "fill(simulator, container, FillAmount::fraction(@ * assumed));"),
       EffectKind::Physics,
       [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.fill = as.strength[0]; });
 }
@@ -402,7 +387,6 @@ InteractionEffect<Model> fill_effect(double most = 1.25) {
 /// What may be wrong with poses and cameras. @param bodies their names, in the order of the scene's motions.
 template <class Model>
 std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std::string>& bodies) {
-  using detail::plain_effect;
   using detail::run_effect;
   using Changes = InteractionChanges<Model>;
   std::vector<InteractionEffect<Model>> effects;

@@ -14,6 +14,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/discovery/reading_series.hpp>
+#include <decant/discovery/time_windows.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -50,9 +51,7 @@ class ReadingFeatures {
       const double duration = own.size() > 0 ? own.time(own.size() - 1) - own.time(0) : 0;
       const double window = std::max(settings.window, duration / settings.most_windows);
       for (std::size_t k = 0; k < own.size(); ++k) {
-        // a reading that is due at the window's very end belongs to the next one, whatever rounding says
-        const auto number = std::min(static_cast<int>(std::floor((own.time(k) - own.time(0)) / window + 1e-6)),
-                                     settings.most_windows - 1);
+        const int number = std::min(window_number(own.time(k) - own.time(0), window), settings.most_windows - 1);
         if (!own.seen(k)) {
           continue;
         }

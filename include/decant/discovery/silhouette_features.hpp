@@ -15,6 +15,7 @@
 #include <decant/core/pixel_box.hpp>
 #include <decant/core/target.hpp>
 #include <decant/discovery/silhouette_series.hpp>
+#include <decant/discovery/time_windows.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -133,9 +134,7 @@ class SilhouetteFeatures {
   std::vector<Window> windows_of(const SilhouetteSeries& recording) const {
     std::vector<Window> windows;
     for (std::size_t frame = 0; frame < recording.frames(); ++frame) {
-      // a frame that is due at the window's very end belongs to the next one, whatever rounding says
-      const double passed = recording.time(frame) - recording.time(0);
-      const int number = static_cast<int>(std::floor(passed / settings_.window + 1e-6));
+      const int number = window_number(recording.time(frame) - recording.time(0), settings_.window);
       if (recording.seen(frame)) {
         if (windows.empty() || windows.back().number != number) {
           windows.push_back({number, {}});

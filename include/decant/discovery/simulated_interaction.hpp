@@ -189,38 +189,13 @@ class SimulatedInteraction {
     auto& [changes, discretisation] = result;
     changes.body_offset.assign(scene_.motion.size(), Vector3<double>::Zero());
     changes.first = scene_.times.front();
-    std::vector<AppliedEffect> as;
-    for (const Effect& effect : effects_) {
-      as.push_back({as.size(), effect.base(), effect.place, effect.window});
-    }
+    std::mt19937 random(run.seed);
     if (run.tolerated) {
-      std::mt19937 random(run.seed);
-      const auto draw = [&] { return static_cast<double>(random()) / 4294967295.0; };  // 0 .. 1
       const std::size_t variants = settings_.discretisations.size();
-      const auto which = static_cast<std::size_t>(draw() * static_cast<double>(variants));
+      const auto which = static_cast<std::size_t>(detail::unit_draw(random) * static_cast<double>(variants));
       discretisation = settings_.discretisations[std::min(which, variants - 1)];
-      for (std::size_t k = 0; k < effects_.size(); ++k) {
-        for (std::size_t component = 0; component < effects_[k].components.size(); ++component) {
-          const EffectComponent& of = effects_[k].components[component];
-          if (of.tolerance > 0 && effects_[k].kind != EffectKind::Nuisance) {
-            as[k].strength[static_cast<Eigen::Index>(component)] =
-                std::clamp(of.base + (2 * draw() - 1) * of.tolerance, of.low, of.high);
-          }
-        }
-      }
     }
-    for (const AppliedEffect& applied : run.effects) {
-      expects(applied.effect < effects_.size(), "ModelRun: effect", "one of the model's", applied.effect);
-      const Effect& effect = effects_[applied.effect];
-      expects(applied.strength.size() == static_cast<Eigen::Index>(effect.components.size()) &&
-                  applied.strength.allFinite(),
-              "ModelRun: strength of '" + effect.name + "'", "a finite number for each component",
-              applied.strength.size());
-      AppliedEffect& own = as[applied.effect];
-      own.strength = applied.strength;
-      own.place = applied.place ? applied.place : own.place;
-      own.window = applied.window ? applied.window : own.window;
-    }
+    const std::vector<AppliedEffect> as = effects_of_run(effects_, run, random);
     for (std::size_t k = 0; k < effects_.size(); ++k) {
       if (as[k].strength != effects_[k].base()) {
         apply_[k](as[k], changes);
