@@ -65,6 +65,7 @@ int main(int count, char** values) {
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double spacing_mm = 1e3 * options.model.spacing;
+  const double usual_rate = options.frames_per_second;
   int threads = 0;
   CLI::App app("Finds which effect a simulation lacks, how strong it is, and whether other recordings agree.");
   app.add_option("--learn", learn_folders, "folders of recordings that have it, format version 1")->required();
@@ -86,6 +87,9 @@ int main(int count, char** values) {
                  "level_mm=3, in the channel's unit; several by commas")
       ->delimiter(',');
   app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--frames-per-second", options.frames_per_second,
+                 "of those that are compared; sensors are read in them")
+      ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--draws", settings.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
       ->check(CLI::Range(5, 1000));
@@ -98,17 +102,27 @@ int main(int count, char** values) {
     options.model.spacing = 1e-3 * spacing_mm;
     options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
     options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
+    double& window = settings.evidence.readings.window;
+    window = std::min(window, 2 / options.frames_per_second);
+    std::map<std::string, decant::Recording> recordings;
+    for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders}) {
+      for (const std::string& folder : *folders) {
+        recordings[folder] = decant::read_recording(folder);
+        options.gain_of.merge(example::uncertain_gains(recordings[folder]));
+      }
+    }
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
-    const auto read = [&](const std::vector<std::string>& folders) {
+    const auto interactions_of = [&](const std::vector<std::string>& folders) {
       Interactions interactions;
       for (const std::string& folder : folders) {
         kept.push_back(std::make_unique<example::RecordedInteraction>(
-            example::recorded_interaction(decant::read_recording(folder), options)));
+            example::recorded_interaction(recordings.at(folder), options)));
         interactions.push_back(kept.back()->interaction(folder));
       }
       return interactions;
     };
-    Interactions learn = read(learn_folders), held_out = read(held_out_folders), references = read(reference_folders);
+    Interactions learn = interactions_of(learn_folders), held_out = interactions_of(held_out_folders),
+                 references = interactions_of(reference_folders);
     const std::vector<decant::Effect>& effects = kept.front()->model.effects();
     const auto planned =
         static_cast<double>(decant::plan_dictionary(effects, settings.dictionary).size() * learn_folders.size());
@@ -122,7 +136,10 @@ int main(int count, char** values) {
     if (!journal_file.empty()) {
       journal.emplace(executor, journal_file,
                       std::string("find_missing_effect of decant ") + DECANT_VERSION + " at " +
-                          decant::detail::number_text(spacing_mm) + " mm");
+                          decant::detail::number_text(spacing_mm) + " mm" +
+                          (options.frames_per_second == usual_rate
+                               ? ""
+                               : ", " + decant::detail::number_text(options.frames_per_second) + " frames a second"));
     }
     const decant::RunJobs run_jobs = [&](const std::vector<std::string>& keys,
                                          const std::function<decant::JobResult(std::size_t)>& work) {
@@ -141,12 +158,22 @@ int main(int count, char** values) {
                 example::references_sentence(reference_folders.size(), result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
                 example::candidates_table(result.judged, result).text().c_str());
+    std::vector<const example::RecordedInteraction*> interactions;
     std::vector<std::vector<std::string>> sensors;
-    for (const auto& each : kept) {
-      sensors.push_back(each->sensors());
+    for (std::size_t k = 0; k < learn_folders.size() + held_out_folders.size(); ++k) {
+      interactions.push_back(kept[k].get());
+      sensors.push_back(kept[k]->sensors());
     }
-    if (std::any_of(sensors.begin(), sensors.end(), [](const auto& each) { return !each.empty(); })) {
-      std::printf("%s", example::where_read_table(learn_folders, sensors, result).text().c_str());
+    const bool read = std::any_of(sensors.begin(), sensors.end(), [](const auto& each) { return !each.empty(); });
+    std::vector<example::ComparedModel> models;
+    example::in_first_process(executor, [&] {
+      if (read || !report_file.empty()) {
+        models = example::compared_models(interactions, result);
+      }
+    });
+    if (read) {
+      std::printf("%s%s", example::where_read_table(learn_folders, sensors, result).text().c_str(),
+                  example::readings_table(models, interactions).text().c_str());
     }
     if (result.verdict == decant::Verdict::Nothing) {
       std::printf("What would have been seen in about nine of ten such recordings:\n%s",
@@ -158,15 +185,11 @@ int main(int count, char** values) {
         json["seconds"] = 1e-3 * milliseconds;
         json["spacing_mm"] = spacing_mm;
         json["references"] = reference_folders.size();
+        json["readings"] = example::readings_json(models, interactions);
         example::write_result(json_file, json);
       }
       if (!report_file.empty()) {
-        std::vector<const example::RecordedInteraction*> interactions;
-        for (const auto& each : kept) {
-          interactions.push_back(each.get());
-        }
-        interactions.resize(learn_folders.size() + held_out_folders.size());
-        example::write_missing_effect_report(report_file, interactions, learn_folders.size(), result,
+        example::write_missing_effect_report(report_file, interactions, learn_folders.size(), models, result,
                                              reference_folders.size());
       }
     });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Replays a measured motion of a cylinder of water and compares simulated with measured sloshing:
 //   replay_motion --poses FILE.csv --heights FILE.csv --radius-mm 49 --depth-mm 78 --json OUT.json --report OUT.html
+// With --recording FOLDER what was measured becomes a recording, for find_missing_effect.
 // Exit status 0: done; 1: the run failed on the way; 2: a file or an argument is wrong.
 
 #include <algorithm>
@@ -8,7 +9,9 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -17,8 +20,11 @@
 
 #include <CLI/CLI.hpp>
 
+#include <decant/boundary/shapes.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/io/motion_file.hpp>
+#include <decant/io/recording.hpp>
+#include <decant/io/recording_writer.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/scene.hpp>
 #include <decant/io/series_file.hpp>
@@ -32,12 +38,23 @@
 namespace {
 
 struct Arguments {
-  std::string poses, heights, json, report, vtk;
+  std::string poses, heights, json, report, vtk, recording;
   double radius_mm = 49, depth_mm = 78, spacing_mm = 4, decay_s = 4;
   int threads = 0;
 };
 
-/// An open cylinder, deep enough that nothing spills, that is filled and moves as the poses say.
+/// Open, and deep enough that nothing spills.
+decant::CylinderInside cylinder_of(const Arguments& arguments) {
+  const double radius = 1e-3 * arguments.radius_mm;
+  return {radius, 1e-3 * arguments.depth_mm + 3 * radius, 0.003, decant::Face::PositiveZ};
+}
+
+/// What the measured container holds [m^3].
+double volume_of(const Arguments& arguments) {
+  return 1e-9 * std::numbers::pi * arguments.radius_mm * arguments.radius_mm * arguments.depth_mm;
+}
+
+/// A cylinder that is filled and moves as the poses say.
 decant::Scene scene_of(const Arguments& arguments, const decant::PoseTrack& poses) {
   decant::Scene scene;
   scene.name = "replay_motion";
@@ -45,13 +62,12 @@ decant::Scene scene_of(const Arguments& arguments, const decant::PoseTrack& pose
   scene.end = poses.end_time() + arguments.decay_s;
   scene.record_rate = 120;  // twice the cameras' rate, so that peaks are not cut
   scene.liquid = {998.0, 0.001, 0.0728};
-  const double radius = 1e-3 * arguments.radius_mm, depth = 1e-3 * arguments.depth_mm;
+  const decant::CylinderInside cylinder = cylinder_of(arguments);
   scene.bodies.push_back(
-      {"cylinder", decant::scene::CylinderInside{radius, depth + 3 * radius, 0.003, decant::scene::Face::PositiveZ},
+      {"cylinder",
+       decant::scene::CylinderInside{cylinder.radius, cylinder.height, cylinder.wall, decant::scene::Face::PositiveZ},
        poses, true, decant::scene::Slip::Free});
-  // by volume: what the measured container holds is pi R^2 depth
-  const double volume = std::numbers::pi * radius * radius * depth;
-  scene.fluid.push_back(decant::scene::Fill{0, decant::scene::Fill::Amount::Volume, volume});
+  scene.fluid.push_back(decant::scene::Fill{0, decant::scene::Fill::Amount::Volume, volume_of(arguments)});
   scene.gauges.push_back({"top_mm@cylinder", decant::scene::TopGauge{0}});
   return scene;
 }
@@ -113,6 +129,38 @@ Comparison compare(const Arguments& arguments, const decant::PoseTrack& poses, c
     out.measured_decay = example::fit_decay({out.measured}, shift + decay_begin, shift + out.motion_end + 8, low, high);
   }
   return out;
+}
+
+/// What was measured, on the poses' clock, from the first pose to the end of the decay.
+void write_measured(const Arguments& arguments, const decant::PoseTrack& poses, const Comparison& c) {
+  using namespace decant;
+  Recording recording;
+  recording.name = std::filesystem::path(arguments.recording).filename().string();
+  recording.frames_per_second = 60;
+  recording.width = 640;  // of a camera that saw nothing: poses are stored in a camera's frame
+  recording.height = 480;
+  recording.cameras.push_back({{{500, 500, 319.5, 239.5}}});
+  recording::Body body;
+  body.object_id = 1;
+  body.name = "cylinder";
+  body.mesh = cylinder_of(arguments).mesh();
+  body.motion = poses;
+  recording.bodies.push_back(body);
+  recording.liquid.initial = recording::Initial{0, std::nullopt, volume_of(arguments)};
+  recording::Channel top;
+  top.name = "top_mm@cylinder";
+  const auto frames = static_cast<std::size_t>((poses.end_time() + arguments.decay_s) * recording.frames_per_second);
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    const double time = static_cast<double>(frame) / recording.frames_per_second;
+    recording.measurements.times.push_back(time);
+    top.values.push_back(example::value_at(c.measured, time + c.alignment.shift));
+  }
+  recording.measurements.channels.push_back(std::move(top));
+  RecordingWriter writer(arguments.recording, recording);
+  for (std::size_t frame = 0; frame < frames; ++frame) {
+    writer.add_frame({});
+  }
+  writer.finish();
 }
 
 std::string text(double value, int digits) {
@@ -232,6 +280,10 @@ int run(const Arguments& arguments) {
     std::printf("status: %s\n", result.status.c_str());
   }
   std::printf("figures: %s\n", arguments.json.c_str());
+  if (!arguments.recording.empty()) {
+    write_measured(arguments, poses, comparison);
+    std::printf("recording: %s\n", arguments.recording.c_str());
+  }
   if (!arguments.report.empty()) {
     write_report(arguments, comparison, result, wall_seconds);
     std::printf("report:  %s\n", arguments.report.c_str());
@@ -256,6 +308,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 600.0));
   app.add_option("--json", arguments.json, "Where figures and series go")->required();
   app.add_option("--report", arguments.report, "HTML report with charts and pictures");
+  app.add_option("--recording", arguments.recording,
+                 "Folder to write what was measured to as a recording, with its clock as that of the poses");
   app.add_option("--vtk", arguments.vtk, "Folder for VTK files; open its all.pvd in ParaView");
   app.add_option("--threads", arguments.threads, "Number of threads, 0 for all")->check(CLI::Range(0, 1024));
   try {

@@ -5,11 +5,16 @@
 /// against the mended one.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <nlohmann/json.hpp>
 
 #include <decant/core/parallel.hpp>
 #include <decant/discovery/missing_effect.hpp>
@@ -24,7 +29,7 @@
 
 namespace example {
 
-/// A run of a recording's model beside what its first camera saw.
+/// A run of a recording's model beside what was read and what its first camera saw, if there is one.
 struct ModelView {
   decant::OverlapScore overlap{};
   std::vector<double> iou{};                  ///< by frame that is compared; NaN where nothing was seen
@@ -37,8 +42,19 @@ inline ModelView view_of_run(const RecordedInteraction& of, const decant::ModelR
   ModelView view;
   view.volume.resize(of.recording.bodies.size());
   view.read.resize(of.seen.readings.size());
-  const auto seen = detail::believed_masks(of.recording, 0, of.frames);
-  of.model.watch(run, [&](std::size_t frame, EffectModel& model, std::span<const decant::Mask> predicted) {
+  const auto seen = of.cameras.empty() ? std::vector<std::optional<decant::Mask>>()
+                                       : detail::believed_masks(of.recording, of.cameras.front(), of.frames);
+  const auto compare = [&](std::size_t frame, EffectModel& model, std::span<const decant::Mask> predicted,
+                           std::span<const double> read) {
+    for (std::size_t sensor = 0; sensor < read.size(); ++sensor) {
+      view.read[sensor].push_back(read[sensor]);
+    }
+    for (const auto& contained : model.step(0).contents) {
+      view.volume[contained.body].push_back(1e6 * contained.volume);
+    }
+    if (seen.empty()) {
+      return;
+    }
     const decant::Mask* mask = seen[frame] ? &*seen[frame] : nullptr;
     const decant::Overlap overlap =
         mask != nullptr ? decant::overlap(predicted.front(), *mask) : decant::Overlap();  // of nothing
@@ -47,17 +63,10 @@ inline ModelView view_of_run(const RecordedInteraction& of, const decant::ModelR
     Overlay overlay = overlay_of(predicted.front(), mask);
     overlay.counts = mask != nullptr && overlap.union_px() >= decant::OverlapScoreSettings{}.least_union_px;
     view.overlays.push_back(std::move(overlay));
-    for (std::size_t sensor = 0; sensor < view.read.size(); ++sensor) {
-      view.read[sensor].push_back(of.model.scene().sensors[sensor].read(model));
-    }
-    for (const auto& contained : model.step(0).contents) {
-      view.volume[contained.body].push_back(1e6 * contained.volume);
-    }
-  });
+  };
+  of.model.watch(run, compare);
   return view;
 }
-
-namespace detail {
 
 /// A model to be compared with recordings, and how it does with each.
 struct ComparedModel {
@@ -66,8 +75,10 @@ struct ComparedModel {
   std::vector<ModelView> views{};  ///< by recording
 };
 
-/// The model as it is, and with what was found or, where nothing explains the gap, with what comes nearest.
-inline std::vector<ComparedModel> compared_models(const Effects& effects, const decant::MissingEffect& result) {
+/// Runs the model as it is, and with what was found or, where nothing explains the gap, with what comes nearest, on all
+/// cores.
+inline std::vector<ComparedModel> compared_models(const std::vector<const RecordedInteraction*>& interactions,
+                                                  const decant::MissingEffect& result) {
   std::vector<ComparedModel> models{{"the model as it is"}};
   std::vector<decant::RefinedEffect> added = result.found;
   if (added.empty() && !result.refined.empty()) {
@@ -77,18 +88,81 @@ inline std::vector<ComparedModel> compared_models(const Effects& effects, const 
     ComparedModel& with = models.emplace_back();
     for (const decant::RefinedEffect& each : added) {
       with.name += with.name.empty() ? "with " : " and ";
-      with.name += effect_words(effects, each);
+      with.name += detail::effect_words(result.judged, each);
       with.effects.push_back(each.applied());
     }
   }
+  for (ComparedModel& model : models) {
+    model.views.resize(interactions.size());
+  }
+  const auto runs = static_cast<decant::Index>(models.size() * interactions.size());
+  decant::parallel_jobs(runs, {0}, [&](decant::Index number) {
+    const auto model = static_cast<std::size_t>(number) / interactions.size();
+    const auto which = static_cast<std::size_t>(number) % interactions.size();
+    models[model].views[which] = view_of_run(*interactions[which], {models[model].effects, 1, false});
+  });
   return models;
 }
 
+/// Root mean square of what a model reads too much or too little of; NaN where the recording has no reading.
+inline double reading_error(const decant::ReadingSeries& recorded, const std::vector<double>& read) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t k = 0; k < std::min(recorded.size(), read.size()); ++k) {
+    if (recorded.seen(k)) {
+      sum += (read[k] - recorded.value(k)) * (read[k] - recorded.value(k));
+      ++count;
+    }
+  }
+  return count > 0 ? std::sqrt(sum / count) : std::numeric_limits<double>::quiet_NaN();
+}
+
+/// How far models are from what sensors read.
+inline decant::Table readings_table(const std::vector<ComparedModel>& models,
+                                    const std::vector<const RecordedInteraction*>& interactions) {
+  decant::Table table({"recording", "sensor", "model", "off by, root mean square, in SI units"});
+  for (std::size_t k = 0; k < interactions.size(); ++k) {
+    for (std::size_t sensor = 0; sensor < interactions[k]->seen.readings.size(); ++sensor) {
+      const decant::ReadingSeries& recorded = interactions[k]->seen.readings[sensor];
+      for (const ComparedModel& model : models) {
+        table.add({interactions[k]->recording.name, recorded.name(), model.name,
+                   three_digits(reading_error(recorded, model.views[k].read[sensor]))});
+      }
+    }
+  }
+  return table;
+}
+
+/// The same for scripts: before is the model as it is, after the one with what was found.
+inline nlohmann::json readings_json(const std::vector<ComparedModel>& models,
+                                    const std::vector<const RecordedInteraction*>& interactions) {
+  nlohmann::json json = nlohmann::json::array();
+  for (std::size_t k = 0; !models.empty() && k < interactions.size(); ++k) {
+    for (std::size_t sensor = 0; sensor < interactions[k]->seen.readings.size(); ++sensor) {
+      const decant::ReadingSeries& recorded = interactions[k]->seen.readings[sensor];
+      const auto error = [&](const ComparedModel& model) {
+        return number_json(reading_error(recorded, model.views[k].read[sensor]));
+      };
+      json.push_back({{"recording", interactions[k]->recording.name},
+                      {"sensor", recorded.name()},
+                      {"before", error(models.front())},
+                      {"after", error(models.back())}});
+    }
+  }
+  return json;
+}
+
+namespace detail {
+
+/// Of recordings with a camera.
 inline decant::Table overlap_table(const std::vector<ComparedModel>& models,
                                    const std::vector<const RecordedInteraction*>& interactions) {
   using decant::detail::fixed_text;
   decant::Table table({"recording", "model", "IoU, mean over frames", "IoU, pooled", "at the end [ml]"});
   for (std::size_t k = 0; k < interactions.size(); ++k) {
+    if (interactions[k]->cameras.empty()) {
+      continue;
+    }
     for (const ComparedModel& model : models) {
       const ModelView& view = model.views[k];
       std::string contents;
@@ -141,6 +215,13 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
   for (const std::size_t frame : first.frames) {
     times.push_back(first.recording.timestamps[frame] - first.recording.timestamps.front());
   }
+  report.heading("Seen and predicted: " + first.recording.name);
+  for (std::size_t sensor = 0; sensor < first.seen.readings.size(); ++sensor) {
+    report.chart(sensor_chart(first, sensor, times, models));
+  }
+  if (first.cameras.empty()) {
+    return;
+  }
   std::vector<FilmSource> sources;
   decant::LineChart overlap{"Overlap with what was seen", "time [s]", "IoU", {}};
   overlap.y_within = {0, 1};
@@ -161,7 +242,6 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
       }
     }
   }
-  report.heading("Seen and predicted: " + first.recording.name);
   const Overlays overlays = draw_overlays(first.recording, {1}, sources, 6'500'000, first.frames);
   if (!overlays.films.empty()) {
     const std::vector<std::size_t> chosen = telling_pictures(overlays, sources);
@@ -169,9 +249,6 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
                  chosen);
     report.chart(overlap);
     report.chart(contents);
-    for (std::size_t sensor = 0; sensor < first.seen.readings.size(); ++sensor) {
-      report.chart(sensor_chart(first, sensor, times, models));
-    }
     add_chosen_frames(report, overlays, sources, chosen);
   }
 }
@@ -179,22 +256,13 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
 }  // namespace detail
 
 /// @param interactions those that were learnt from, the first one's films are shown, then those held out.
-/// @param learnt how many of them were learnt from. @param references how many recordings there were in which nothing
-/// is missing.
+/// @param learnt how many of them were learnt from. @param models of compared_models. @param references how many
+/// recordings there were in which nothing is missing.
 inline void write_missing_effect_report(const std::string& file,
                                         const std::vector<const RecordedInteraction*>& interactions, std::size_t learnt,
-                                        const decant::MissingEffect& result, std::size_t references) {
+                                        const std::vector<ComparedModel>& models, const decant::MissingEffect& result,
+                                        std::size_t references) {
   const std::vector<decant::Effect>& effects = result.judged;
-  std::vector<detail::ComparedModel> models = detail::compared_models(effects, result);
-  for (detail::ComparedModel& model : models) {
-    model.views.resize(interactions.size());
-  }
-  const auto runs = static_cast<decant::Index>(models.size() * interactions.size());
-  decant::parallel_jobs(runs, {0}, [&](decant::Index number) {
-    const auto model = static_cast<std::size_t>(number) / interactions.size();
-    const auto which = static_cast<std::size_t>(number) % interactions.size();
-    models[model].views[which] = view_of_run(*interactions[which], {models[model].effects, 1, false});
-  });
   decant::HtmlReport report("What the model lacks");
   report.paragraph(missing_effect_sentence(effects, result));
   for (const decant::RefinedEffect& each : result.found) {
@@ -204,10 +272,17 @@ inline void write_missing_effect_report(const std::string& file,
   }
   report.heading("The gap");
   report.table(gap_table(result));
-  report.paragraph(
-      "Runs from the start on, which no picture corrects: their overlap with what was seen is that of a "
-      "forecast.");
-  report.table(detail::overlap_table(models, interactions));
+  const auto any = [&](auto&& have) { return std::any_of(interactions.begin(), interactions.end(), have); };
+  if (any([](const RecordedInteraction* each) { return !each->cameras.empty(); })) {
+    report.paragraph(
+        "Runs from the start on, which no picture corrects: their overlap with what was seen is that of a "
+        "forecast.");
+    report.table(detail::overlap_table(models, interactions));
+  }
+  if (any([](const RecordedInteraction* each) { return !each->seen.readings.empty(); })) {
+    report.paragraph("What sensors read, and what a run from the start on has them read.");
+    report.table(readings_table(models, interactions));
+  }
   if (result.judgement.has_gap()) {
     report.bar_chart(detail::candidates_chart(effects, result));
   }
@@ -221,7 +296,7 @@ inline void write_missing_effect_report(const std::string& file,
       std::any_of(result.where.begin(), result.where.end(), [](const auto& each) { return !each.empty(); });
   if (somewhere) {
     report.table(where_table(names, result));
-  } else {
+  } else if (!interactions.front()->cameras.empty()) {
     report.paragraph("Nowhere in particular: no part of the picture is off by much.");
   }
   std::vector<std::vector<std::string>> sensors;

@@ -97,7 +97,8 @@ inline std::pair<decant::Vector3<double>, decant::Vector3<double>> lip_of(const 
 struct PourPlaces {
   std::vector<std::optional<Inside>> inside{};                    ///< by body
   decant::Vector3<double> lip = decant::Vector3<double>::Zero();  ///< of the first source, in its frame [m]
-  decant::Vector3<double> jet = decant::Vector3<double>::Zero();  ///< half-way from there to the target [m]
+  /// Half-way from there to the target [m], or the one of them that there is.
+  std::optional<decant::Vector3<double>> jet{};
 };
 
 inline PourPlaces pour_places(const decant::Recording& recording) {
@@ -117,9 +118,7 @@ inline PourPlaces pour_places(const decant::Recording& recording) {
       target = first * BoundingVolumeHierarchy(body.mesh).bounds().center();
     }
   }
-  places.jet = lip && target ? Vector3<double>(0.5 * (*lip + *target))
-               : lip         ? *lip
-                             : target.value_or(Vector3<double>::Zero());
+  places.jet = lip && target ? Vector3<double>(0.5 * (*lip + *target)) : lip ? lip : target;
   return places;
 }
 

@@ -14,6 +14,7 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -47,6 +48,9 @@ struct InteractionOptions {
   decant::SimulatedInteractionSettings model{};
   std::map<std::string, double> tolerances{};  ///< by effect: of each of its components, in place of the catalogue's
   std::map<std::string, double> reading_errors{};  ///< see recorded_sensors
+  /// Kinds of sensors that may show too much or too little: the same for all recordings of a search, see
+  /// uncertain_gains.
+  std::set<std::string> gain_of{};
 };
 
 namespace detail {
@@ -151,11 +155,14 @@ inline std::vector<std::optional<decant::Mask>> believed_masks(const decant::Rec
   return masks;
 }
 
-/// What a camera saw, in cells.
-inline decant::SilhouetteSeries seen_by(const decant::Recording& recording, std::size_t camera,
-                                        const std::vector<std::size_t>& frames, int cell_px) {
+/// What a camera saw, in cells. Nothing if it has no picture of any frame.
+inline std::optional<decant::SilhouetteSeries> seen_by(const decant::Recording& recording, std::size_t camera,
+                                                       const std::vector<std::size_t>& frames, int cell_px) {
   decant::SilhouetteSeries series(recording.width, recording.height, cell_px);
   const auto masks = believed_masks(recording, camera, frames);
+  if (std::none_of(masks.begin(), masks.end(), [](const auto& each) { return each.has_value(); })) {
+    return std::nullopt;
+  }
   for (std::size_t k = 0; k < frames.size(); ++k) {
     const double time = recording.timestamps[frames[k]];
     if (masks[k]) {
@@ -174,11 +181,13 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density, recording.gravity);
   const Vector3<double> up = -recording.gravity.normalized();
   const auto [across, along] = level_directions(recording.gravity);
-  const double aside = 0.08;  // [m]
-  effects.push_back(suction_effect<EffectModel>(places.jet + aside * across, "beside the jet, one side"));
-  effects.push_back(suction_effect<EffectModel>(places.jet - aside * across, "beside the jet, the other side"));
-  effects.push_back(suction_effect<EffectModel>(places.jet + aside * along, "beside the jet, behind"));
-  effects.push_back(suction_effect<EffectModel>(places.jet - aside * along, "beside the jet, in front"));
+  if (places.jet) {
+    const double aside = 0.08;  // [m]
+    effects.push_back(suction_effect<EffectModel>(*places.jet + aside * across, "beside the jet, one side"));
+    effects.push_back(suction_effect<EffectModel>(*places.jet - aside * across, "beside the jet, the other side"));
+    effects.push_back(suction_effect<EffectModel>(*places.jet + aside * along, "beside the jet, behind"));
+    effects.push_back(suction_effect<EffectModel>(*places.jet - aside * along, "beside the jet, in front"));
+  }
   const double begin = recording.timestamps.front(), seconds = recording.timestamps.back() - begin;
   std::vector<InteractionEffect<EffectModel>> of_bodies;
   for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
@@ -261,7 +270,8 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
 struct RecordedInteraction {
   decant::Recording recording;
   RecordedModel model;
-  std::vector<std::size_t> frames;  ///< of the recording, that are compared
+  std::vector<std::size_t> frames;   ///< of the recording, that are compared
+  std::vector<std::size_t> cameras;  ///< of the recording, whose pictures are compared
   decant::Observation seen;
 
   /// Their names.
@@ -279,13 +289,10 @@ struct RecordedInteraction {
   }
 };
 
-/// Throws std::invalid_argument and std::runtime_error for recordings without cameras or with an amount that is not
-/// known, and for tolerances of effects that there are not.
+/// Throws std::invalid_argument and std::runtime_error for recordings in which nothing was seen or read, or with an
+/// amount that is not known, and for tolerances of effects that there are not.
 inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
   using namespace decant;
-  if (recording.cameras.empty()) {
-    throw std::runtime_error(recording.name + ": no camera: expected masks to compare a model with");
-  }
   std::vector<std::size_t> frames = detail::compared_frames(recording, options.frames_per_second);
   InteractionScene<EffectModel, DistortedPinholeCamera> scene;
   for (const std::size_t frame : frames) {
@@ -296,8 +303,13 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
   }
   Observation seen;
   const detail::PourPlaces places = detail::pour_places(recording);
-  const Vector3<double> middle = places.jet;
+  const Vector3<double> middle = places.jet.value_or(Vector3<double>::Zero());
+  std::vector<std::size_t> cameras;
   for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
+    auto series = detail::seen_by(recording, camera, frames, options.model.cell_px);
+    if (!series) {
+      continue;
+    }
     const recording::Camera& of = recording.cameras[camera];
     InteractionCamera<DistortedPinholeCamera> one{camera_of(of.view(0), recording.width, recording.height), {}};
     one.pixels_per_radian = of.view(0).fx;
@@ -306,10 +318,14 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
       one.camera_from_world.push_back(of.view(frame).camera_from_world);
     }
     scene.cameras.push_back(std::move(one));
-    seen.silhouettes.push_back(detail::seen_by(recording, camera, frames, options.model.cell_px));
+    seen.silhouettes.push_back(std::move(*series));
+    cameras.push_back(camera);
   }
   std::tie(scene.sensors, seen.readings) =
       recorded_sensors<EffectModel>(recording, scene.times, places, options.reading_errors);
+  if (seen.silhouettes.empty() && seen.readings.empty()) {
+    throw std::runtime_error(recording.name + ": expected masks or measurements to compare a model with");
+  }
   auto start_of = std::make_shared<Recording>(recording);
   start_of->liquid.surface_tension = 0;
   scene.start = [start_of](const SimulatorSettings& solver, double fill) {
@@ -321,6 +337,15 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     return model_of<EffectParts<float>>(*start_of, tracking);
   };
   auto catalogue = detail::catalogue_of(recording, places);
+  for (const std::string& kind : options.gain_of) {
+    std::vector<std::size_t> sensors;
+    for (std::size_t sensor = 0; sensor < scene.sensors.size(); ++sensor) {
+      if (kind_of_channel(scene.sensors[sensor].name) == kind) {
+        sensors.push_back(sensor);
+      }
+    }
+    catalogue.push_back(sensor_gain_effect<EffectModel>(std::move(sensors), kind));
+  }
   for (const auto& [name, tolerance] : options.tolerances) {
     bool found = false;
     for (auto& effect : catalogue) {
@@ -336,7 +361,7 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     }
   }
   RecordedModel model(std::move(scene), std::move(catalogue), options.model);
-  return {std::move(recording), std::move(model), std::move(frames), std::move(seen)};
+  return {std::move(recording), std::move(model), std::move(frames), std::move(cameras), std::move(seen)};
 }
 
 }  // namespace example

@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -53,25 +54,44 @@ inline std::vector<double> averaged(const std::vector<double>& at, const std::ve
 
 }  // namespace detail
 
+/// A channel's name without its place.
+inline std::string kind_of_channel(const std::string& name) { return name.substr(0, name.find('@')); }
+
 /// What readings are off by as a rule, a model of particles included, and for how long: in kg, m and Pa.
 /// @param channel as the format names it, without its place. Throws std::runtime_error for one that is not compared.
 inline decant::ReadingError usual_reading_error(const std::string& channel) {
   static const std::map<std::string, decant::ReadingError> usual{{"target_mass_g", {2e-3, 0.3}},
                                                                  {"level_mm", {3e-3, 0.3}},
                                                                  {"front_mm", {6e-3, 0.3}},
+                                                                 {"top_mm", {3e-3, 0.3}},
                                                                  {"pressure_pa", {150, 0.1}}};
   const auto found = usual.find(channel);
   if (found == usual.end()) {
     throw std::runtime_error("error of '" + channel +
-                             "': expected one of target_mass_g, level_mm, front_mm and pressure_pa");
+                             "': expected one of target_mass_g, level_mm, front_mm, top_mm and pressure_pa");
   }
   return found->second;
 }
 
-/// The sensors of a recording as a simulation has them, and what they read in some frames. Channels that the format
-/// does not list are passed over. Where a simulation has no liquid, a sensor reads what it reads at least.
+/// Kinds of a recording's sensors that may show too much or too little. A scale does not: it is calibrated to better
+/// than anything else here.
+inline std::set<std::string> uncertain_gains(const decant::Recording& recording) {
+  std::set<std::string> kinds;
+  for (const decant::recording::Channel& channel : recording.measurements.channels) {
+    const std::string kind = kind_of_channel(channel.name);
+    if (kind == "level_mm" || kind == "front_mm" || kind == "top_mm" || kind == "pressure_pa") {
+      kinds.insert(kind);
+    }
+  }
+  return kinds;
+}
+
+/// The sensors of a recording as a simulation has them, and what they read in some frames. Beside the channels that the
+/// format lists there is top_mm@BODY: the liquid's highest point along a body's z axis above what that was in the first
+/// frame. Others are passed over. Where a simulation has no liquid, a sensor reads what it reads at least.
 /// @param times of the frames [s]. @param errors by channel, as the format names them and in its units: standard
-/// deviations in place of the usual ones. Throws std::runtime_error for errors of channels that there are not.
+/// deviations in place of the usual ones. Throws std::runtime_error for errors of channels that there are not, and for
+/// the top in a body that there is not.
 template <class Model>
 std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::ReadingSeries>> recorded_sensors(
     const decant::Recording& recording, const std::vector<double>& times, const detail::PourPlaces& places,
@@ -99,10 +119,11 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
   std::vector<InteractionSensor<Model>> sensors;
   std::vector<ReadingSeries> readings;
   for (const recording::Channel& channel : recording.measurements.channels) {
-    if (channel.quantity == Quantity::Other) {
+    const bool of_top = channel.quantity == Quantity::Other && channel.name.starts_with("top_mm@");
+    if (channel.quantity == Quantity::Other && !of_top) {
       continue;
     }
-    const std::vector<double> values = detail::averaged(recording.measurements.times, channel.values, times);
+    std::vector<double> values = detail::averaged(recording.measurements.times, channel.values, times);
     double least = std::numeric_limits<double>::infinity();
     for (const double value : values) {
       least = std::isfinite(value) ? std::min(least, value) : least;
@@ -112,7 +133,7 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
     }
     InteractionSensor<Model> sensor;
     sensor.name = channel.name;
-    const std::string kind = channel.name.substr(0, channel.name.find('@'));
+    const std::string kind = kind_of_channel(channel.name);
     sensor.error = usual_reading_error(kind);
     if (const auto own = errors.find(kind); own != errors.end()) {
       sensor.error.deviation = own->second * (channel.quantity == Quantity::Pressure ? 1 : 1e-3);
@@ -144,6 +165,19 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
       };
     } else if (channel.quantity == Quantity::Front) {
       sensor.read = [gauges, least](Model& model) { return gauges(model).front().value_or(least); };
+    } else if (of_top) {
+      const auto body = recording.find_body(channel.name.substr(kind.size() + 1));
+      if (!body) {
+        throw std::runtime_error(recording.name + ": measurements: " + channel.name + ": expected the name of a body");
+      }
+      for (double& value : values) {
+        value *= 1e-3;  // the reader does not know its unit
+      }
+      sensor.from_first = true;
+      sensor.read = [gauges, id = static_cast<BodyId>(*body)](Model& model) {
+        const auto& in = model.bodies()[id];
+        return gauges(model).top(in.motion.at(model.time()), in.bounds).value_or(in.bounds.min().z());
+      };
     } else {
       sensor.read = [gauges, at](Model& model) { return gauges(model).pressure(at); };
     }

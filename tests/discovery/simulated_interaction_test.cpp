@@ -484,6 +484,18 @@ TEST_CASE("simulated interaction: sensors read the model in the frames that are 
   const Observation read = pour_of(without_cameras).predict({{}, 1, false});
   CHECK(read.silhouettes.empty());
   CHECK(read.readings[0].values() == seen.readings[0].values());
+  // a sensor that shows half of each change, another only changes
+  std::vector<InteractionEffect<PourModel>> gains = {sensor_gain_effect<PourModel>({0}, "of the first")};
+  scene.sensors[1].from_first = true;
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour uncertain(scene, gains, settings);
+  const Observation half = uncertain.predict({{{0, Eigen::VectorXd::Constant(1, 0.5)}}, 1, false});
+  for (std::size_t frame = 0; frame < scene.times.size(); ++frame) {
+    const double first = seen.readings[0].value(0);
+    CHECK(half.readings[0].value(frame) - first == Approx(0.5 * (seen.readings[0].value(frame) - first)).margin(1e-6));
+    CHECK(half.readings[1].value(frame) == Approx(scene.times[frame] - scene.times[0]).margin(1e-6));
+  }
   scene.sensors[1].error.deviation = 0;
   CHECK_THROWS_WITH(pour_of(scene), decant_test::contains("'time [s]': deviation"));
   scene.sensors[1].read = nullptr;

@@ -5,8 +5,13 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <numbers>
+#include <set>
 #include <string>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include <decant/boundary/shapes.hpp>
 #include <decant/simulation/fill.hpp>
@@ -85,6 +90,40 @@ TEST_CASE("recorded sensors: a simulation reads what the sensors would") {
   CHECK(sensors[2].read(model) == 0.01);  // nothing is there: what it reads at least
   CHECK(sensors[3].read(model) == Approx(0.1).margin(0.003));
   CHECK(sensors[4].read(model) == Approx(998 * 9.81 * 0.028).epsilon(0.15));
+}
+
+TEST_CASE("recorded sensors: the top of liquid is told from the body, and by how much it rises") {
+  Recording recording = recording_of_a_box();
+  recording.measurements.times = {0, 0.1};
+  recording.measurements.channels = {channel("top_mm@pan", recording::Quantity::Other, {0, 0, 0}, {0, 4}),
+                                     channel("humidity", recording::Quantity::Other, {0, 0, 0}, {1, 2})};
+  const auto sensors_of = [&](const std::map<std::string, double>& errors) {
+    return example::recorded_sensors<Model>(recording, {0, 0.1}, example::detail::pour_places(recording), errors);
+  };
+  const auto [sensors, readings] = sensors_of({{"top_mm", 2}});
+  REQUIRE(sensors.size() == 1);
+  CHECK(sensors[0].from_first);
+  CHECK(sensors[0].error.deviation == Approx(0.002));
+  CHECK(readings[0].value(1) == Approx(0.004));
+  CHECK(example::uncertain_gains(recording) == std::set<std::string>{"top_mm"});
+
+  // turned by a quarter about x and lifted: the body's z is the world's -y, along which gravity is
+  SimulatorSettings settings;
+  settings.spacing = 0.004;
+  settings.gravity = {0, 9.81, 0};
+  settings.liquid.surface_tension = 0;
+  Model model(settings);
+  const Pose turned{Eigen::Quaterniond(Eigen::AngleAxisd(0.5 * std::numbers::pi, Vector3<double>::UnitX())),
+                    {0.3, 0.2, 0.5}};
+  const BodyId pan = model.add_body("pan", box, PoseTrack(turned));
+  decant::fill(model, pan, FillAmount::fraction(0.5));
+  for (int step = 0; step < 20; ++step) {
+    REQUIRE(model.step(0.01).advanced());
+  }
+  CHECK(sensors[0].read(model) == Approx(0.03).margin(0.002));
+
+  recording.measurements.channels[0].name = "top_mm@cup";
+  CHECK_THROWS_WITH(sensors_of({}), decant_test::contains("top_mm@cup: expected the name of a body"));
 }
 
 TEST_CASE("recorded sensors: readings are averaged around each frame") {

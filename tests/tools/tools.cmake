@@ -381,6 +381,37 @@ elseif(CASE STREQUAL "find_missing_effect_says_what_it_found")
     message(FATAL_ERROR "a search that was stopped goes on to another answer")
   endif()
 
+elseif(CASE STREQUAL "find_missing_effect_needs_no_picture")
+  # heights of a finer simulation in place of measured ones, by a sensor that shows three fifths of them
+  set(motion TRD_2D_0.3m_2.4s_270deg)
+  execute_process(
+    COMMAND "${REPLAY}" --poses "${SOURCE}/examples/data/pose_${motion}.csv" --heights
+            "${SOURCE}/examples/data/height_${motion}.csv" --radius-mm 49 --depth-mm 78 --spacing-mm 12 --decay-s 0.2
+            --json replay.json --recording moved
+    WORKING_DIRECTORY "${SCRATCH}" RESULT_VARIABLE result ERROR_VARIABLE errors OUTPUT_QUIET)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "replay_motion failed: ${errors}")
+  endif()
+  execute_process(
+    COMMAND awk "/\"t_s\": \\[/ {to = \"t\"; n = 0; next} /\"height_mm\": \\[/ {to = \"h\"; n = 0; next}
+                 /\\]/ {to = \"\"} to == \"t\" {t[n++] = $1 + 0} to == \"h\" {h[n++] = $1 + 0}
+                 END {print \"t_s,top_mm@cylinder\"; for (k = 0; k < n; ++k) print t[k] \",\" 0.6 * h[k]}" replay.json
+    WORKING_DIRECTORY "${SCRATCH}" OUTPUT_FILE moved/measurements.csv)
+  run(0 --learn moved --spacing-mm 16 --frames-per-second 60 --reading-error top_mm=1 --draws 8 --json out.json
+      --report out.html)
+  file(READ "${SCRATCH}/out.json" json)
+  string(JSON verdict GET "${json}" verdict)
+  string(JSON effect GET "${json}" effect 0)
+  string(JSON strength GET "${json}" strength)
+  string(JSON before GET "${json}" readings 0 before)
+  string(JSON after GET "${json}" readings 0 after)
+  if(NOT verdict STREQUAL named OR NOT effect STREQUAL sensor_gain OR strength LESS 0.5 OR strength GREATER 0.7)
+    message(FATAL_ERROR "not what is hidden: ${verdict} ${effect} ${strength}")
+  endif()
+  if(NOT before GREATER 0.003 OR NOT after LESS 0.002)
+    message(FATAL_ERROR "readings were off by ${before} m and are by ${after} m")
+  endif()
+
 elseif(CASE STREQUAL "find_missing_effect_refuses")
   set(pour "${SOURCE}/examples/data/pour_cup")
   run(2 --json out.json)

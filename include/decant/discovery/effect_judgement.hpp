@@ -179,6 +179,12 @@ inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& 
   return level;
 }
 
+/// Of what is more than where nothing is missing, how much less there is after something: at most 1 where more than
+/// that has gone by luck, and at least -1.
+inline double share_of_reducible(double before, double after, double noise) noexcept {
+  return std::clamp((before - after) / std::max(before - noise, 1e-12), -1.0, 1.0);
+}
+
 /// Judges effects by what one or more recordings say, all of which have the effect at one strength.
 /// The vote: the improvement of the distance, twice, and those of the gaps, each over the best effect's; a gap is asked
 /// only if it shrinks by more than chance makes it.
@@ -205,7 +211,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
     one.improvement = profile.improvement() / count;
     one.distance = joint.distance - one.improvement;
     one.fall = relative_fall(joint.distance, one.distance);
-    one.share = std::min(1.0, one.improvement / std::max(joint.distance - chance.distance, 1e-12));
+    one.share = share_of_reducible(joint.distance, one.distance, chance.distance);
     for (std::size_t component = 0; component < profile.components(); ++component) {
       one.interval.push_back(profile.within(component, std::max(chance.fall * one.distance, 1e-9) * count));
     }

@@ -421,4 +421,19 @@ std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std:
   return effects;
 }
 
+/// Sensors, by their places among the scene's, that show more or less of what happens than there is: badly calibrated,
+/// or cameras that see a part of the liquid.
+template <class Model>
+InteractionEffect<Model> sensor_gain_effect(std::vector<std::size_t> sensors, std::string where) {
+  Effect effect = plain_effect("sensor_gain", "", "", "sensors show more (less, below 1) of each change than there is",
+                               {"", 1, 0.6, 1.4, 0.02}, "");
+  effect.where = std::move(where);
+  return detail::run_effect<Model>(std::move(effect), EffectKind::Measurement,
+                                   [sensors](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                     for (const std::size_t sensor : sensors) {
+                                       changes.sensor_gain.at(sensor) = as.strength[0];
+                                     }
+                                   });
+}
+
 }  // namespace decant::inline DECANT_TARGET

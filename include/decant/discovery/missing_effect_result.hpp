@@ -3,7 +3,6 @@
 
 /// What the workflow that finds what a model lacks comes to.
 
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -57,8 +56,7 @@ struct GapChange {
   double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
   double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
 
-  /// Of what is reducible, at most 1.
-  double share() const noexcept { return std::min(1.0, (before - after) / std::max(before - noise, 1e-12)); }
+  double share() const noexcept { return share_of_reducible(before, after, noise); }
 };
 
 /// What was found.

@@ -54,9 +54,10 @@ template <class Model>
 struct InteractionSensor {
   std::string name{};  ///< for people, with its unit
   ReadingError error{};
-  /// What it reads of a simulation as it is now, without its errors; called for each frame, from several threads, each
-  /// with a model of its own.
+  /// What there is to read of a simulation as it is now, without errors; called for each frame, from several threads,
+  /// each with a model of its own.
   std::function<double(Model& model)> read{};
+  bool from_first = false;  ///< it shows how much there is beyond what there was in the first frame
 };
 
 /// How an interaction went, as far as it was recorded.
@@ -82,6 +83,7 @@ struct InteractionChanges {
   Eigen::Vector2d camera_shift{0, 0};                   ///< of the picture [px]
   double camera_roll = 0;                               ///< of the picture about its middle, clockwise [rad]
   double mask_growth = 0;                               ///< of silhouettes on all sides [px]
+  std::vector<double> sensor_gain{};                    ///< by sensor: so much of each change since the first frame
   std::vector<std::function<void(Model&)>> of_model{};  ///< done to the model before it starts
 };
 
@@ -188,6 +190,7 @@ class SimulatedInteraction {
     std::pair<Changes, Discretisation> result;
     auto& [changes, discretisation] = result;
     changes.body_offset.assign(scene_.motion.size(), Vector3<double>::Zero());
+    changes.sensor_gain.assign(scene_.sensors.size(), 1);
     changes.first = scene_.times.front();
     std::mt19937 random(run.seed);
     if (run.tolerated) {
@@ -253,18 +256,18 @@ class SimulatedInteraction {
     for (const InteractionSensor<Model>& sensor : scene_.sensors) {
       seen.readings.emplace_back(sensor.name, sensor.error);
     }
-    const bool ended = watch(run, [&](std::size_t frame, Model& model, std::span<const Mask> masks) {
+    const auto see = [&](std::size_t frame, const Model&, std::span<const Mask> masks, std::span<const double> read) {
       for (std::size_t camera = 0; camera < masks.size(); ++camera) {
         seen.silhouettes[camera].add(scene_.times[frame], masks[camera]);
       }
-      for (std::size_t sensor = 0; sensor < scene_.sensors.size(); ++sensor) {
-        seen.readings[sensor].add(scene_.times[frame], scene_.sensors[sensor].read(model));
+      for (std::size_t sensor = 0; sensor < read.size(); ++sensor) {
+        seen.readings[sensor].add(scene_.times[frame], read[sensor]);
       }
-    });
-    return ended ? seen : Observation();
+    };
+    return watch(run, see) ? seen : Observation();
   }
 
-  /// Runs, and calls frame_is_there(frame, model, masks by camera) for each frame that is compared.
+  /// Runs, and calls frame_is_there(frame, model, masks by camera, readings by sensor) for each frame that is compared.
   /// @return whether the simulation came to its end; false as well where it cannot be given an effect as it is asked
   /// for: a hole in mid-air.
   template <class FrameIsThere>
@@ -281,6 +284,7 @@ class SimulatedInteraction {
       eyes.push_back(eye(camera, changes, discretisation.drawing, model));
     }
     std::vector<Mask> masks(eyes.size());
+    std::vector<double> first_read(scene_.sensors.size()), read(scene_.sensors.size());
     const double start = model.time() - scene_.times.front();
     for (std::size_t frame = 0; frame < scene_.times.size(); ++frame) {
       const double until = start + scene_.times[frame];
@@ -292,7 +296,15 @@ class SimulatedInteraction {
       for (std::size_t k = 0; k < eyes.size(); ++k) {
         eyes[k].picture.predict(model, 0, eyes[k].turn * scene_.cameras[k].camera_from_world[frame], masks[k]);
       }
-      frame_is_there(frame, model, std::span<const Mask>(masks));
+      for (std::size_t k = 0; k < read.size(); ++k) {
+        const double there = scene_.sensors[k].read(model);
+        if (frame == 0 || !std::isfinite(first_read[k])) {
+          first_read[k] = there;
+        }
+        const double change = changes.sensor_gain[k] * (there - first_read[k]);
+        read[k] = scene_.sensors[k].from_first ? change : changes.sensor_gain[k] == 1 ? there : first_read[k] + change;
+      }
+      frame_is_there(frame, model, std::span<const Mask>(masks), std::span<const double>(read));
     }
     return true;
   }
