@@ -37,6 +37,8 @@
 
 namespace {
 
+constexpr double recording_rate = 60;  ///< that of the cameras, frames per second
+
 struct Arguments {
   std::string poses, heights, json, report, vtk, recording;
   double radius_mm = 49, depth_mm = 78, spacing_mm = 4, decay_s = 4;
@@ -131,12 +133,12 @@ Comparison compare(const Arguments& arguments, const decant::PoseTrack& poses, c
   return out;
 }
 
-/// What was measured, on the poses' clock, from the first pose to the end of the decay.
-void write_measured(const Arguments& arguments, const decant::PoseTrack& poses, const Comparison& c) {
+/// A recording of the motion, still without frames.
+decant::RecordingWriter begin_recording(const Arguments& arguments, const decant::PoseTrack& poses) {
   using namespace decant;
   Recording recording;
   recording.name = std::filesystem::path(arguments.recording).filename().string();
-  recording.frames_per_second = 60;
+  recording.frames_per_second = recording_rate;
   recording.width = 640;  // of a camera that saw nothing: poses are stored in a camera's frame
   recording.height = 480;
   recording.cameras.push_back({{{500, 500, 319.5, 239.5}}});
@@ -147,19 +149,24 @@ void write_measured(const Arguments& arguments, const decant::PoseTrack& poses, 
   body.motion = poses;
   recording.bodies.push_back(body);
   recording.liquid.initial = recording::Initial{0, std::nullopt, volume_of(arguments)};
-  recording::Channel top;
-  top.name = "top_mm@cylinder";
-  const auto frames = static_cast<std::size_t>((poses.end_time() + arguments.decay_s) * recording.frames_per_second);
-  for (std::size_t frame = 0; frame < frames; ++frame) {
-    const double time = static_cast<double>(frame) / recording.frames_per_second;
-    recording.measurements.times.push_back(time);
-    top.values.push_back(example::value_at(c.measured, time + c.alignment.shift));
+  return {arguments.recording, recording};
+}
+
+/// Completes it with what was measured, on the poses' clock, to the end of the decay.
+void finish_recording(decant::RecordingWriter& writer, double end, const Comparison& c) {
+  if (!(c.alignment.correlation > -1)) {
+    throw std::runtime_error("the heights do not cover the motion: expected a recording of all of it");
   }
-  recording.measurements.channels.push_back(std::move(top));
-  RecordingWriter writer(arguments.recording, recording);
-  for (std::size_t frame = 0; frame < frames; ++frame) {
+  decant::recording::Measurements measurements;
+  decant::recording::Channel top;
+  top.name = "top_mm@cylinder";
+  for (int frame = 0; frame < end * recording_rate; ++frame) {
+    measurements.times.push_back(frame / recording_rate);
+    top.values.push_back(example::value_at(c.measured, measurements.times.back() + c.alignment.shift));
     writer.add_frame({});
   }
+  measurements.channels.push_back(std::move(top));
+  writer.set_measurements(std::move(measurements));
   writer.finish();
 }
 
@@ -260,6 +267,10 @@ int run(const Arguments& arguments) {
     throw std::runtime_error(arguments.poses + ": times [s] must start at 0 or later");
   }
   example::expect_writable(arguments.json);
+  std::optional<decant::RecordingWriter> recording;
+  if (!arguments.recording.empty()) {
+    recording.emplace(begin_recording(arguments, poses));
+  }
 
   example::RunOptions options;
   options.threads = arguments.threads;
@@ -280,8 +291,8 @@ int run(const Arguments& arguments) {
     std::printf("status: %s\n", result.status.c_str());
   }
   std::printf("figures: %s\n", arguments.json.c_str());
-  if (!arguments.recording.empty()) {
-    write_measured(arguments, poses, comparison);
+  if (recording) {
+    finish_recording(*recording, poses.end_time() + arguments.decay_s, comparison);
     std::printf("recording: %s\n", arguments.recording.c_str());
   }
   if (!arguments.report.empty()) {

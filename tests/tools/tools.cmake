@@ -115,12 +115,25 @@ elseif(CASE STREQUAL "replay_motion_reports")
   set(motion TRD_2D_0.3m_2.4s_270deg)
   # a coarse and short run: that it works; how well it agrees with the measurement is for the physics tests
   run(0 --poses "${SOURCE}/examples/data/pose_${motion}.csv" --heights "${SOURCE}/examples/data/height_${motion}.csv"
-      --radius-mm 49 --depth-mm 78 --spacing-mm 10 --decay-s 1 --json out.json --report out.html)
+      --radius-mm 49 --depth-mm 78 --spacing-mm 10 --decay-s 1 --json out.json --report out.html --recording moved)
   expect_keys("${SCRATCH}/out.json" peak_mm measured_peak_mm correlation time_shift_s decay_frequency_hz
               measured_frequency_hz damping_ratio lost wall_s series.t_s series.height_mm)
   if(NOT EXISTS "${SCRATCH}/out.html" OR NOT output MATCHES "out.html")
     message(FATAL_ERROR "the report is missing, or the output does not say where it is:\n${output}")
   endif()
+  # what was measured, as a recording of 60 frames a second on the clock of the poses; figures are at 120
+  file(READ "${SCRATCH}/out.json" json)
+  string(JSON height GET "${json}" series measured_height_mm 240)
+  file(STRINGS "${SCRATCH}/moved/measurements.csv" lines)
+  list(GET lines 0 head)
+  list(GET lines 121 row)
+  string(SUBSTRING "${height}" 0 8 height)
+  if(NOT head STREQUAL "t_s,top_mm@cylinder" OR NOT row MATCHES "^2,${height}" OR NOT height MATCHES "^[1-9]")
+    message(FATAL_ERROR "the recording has ${head}: ${row} where ${height} mm were measured")
+  endif()
+  run(2 --poses "${SOURCE}/examples/data/pose_${motion}.csv" --heights "${SOURCE}/examples/data/height_${motion}.csv"
+      --radius-mm 49 --depth-mm 78 --json out.json --recording moved)
+  expect_one_line("${errors}" "moved.*a new or an empty folder")
 
 elseif(CASE STREQUAL "replay_motion_refuses_a_missing_file")
   run(2 --poses missing.csv --heights missing.csv --radius-mm 49 --depth-mm 78 --json out.json)
