@@ -132,6 +132,11 @@ TEST_CASE("effect judgement: a name, a set, nothing or unexplained") {
 
   CHECK(judge(evidence(1.9, {0.1, 0.2, 0.29})).verdict == Verdict::Nothing);
   CHECK(judge(evidence(1.9, {0.1, 0.2, 0.6})).verdict == Verdict::Named);  // small, and beyond chance all the same
+  const Judgement by_luck = judge(evidence(1, {0.1, 0.2, 0.6}));  // less than what there is where nothing is missing
+  REQUIRE(by_luck.standings.size() == 3);
+  CHECK(by_luck.standings[0].share == Approx(1).epsilon(1e-4));
+  CHECK(by_luck.standings[1].share == Approx(0.2 / 0.6).epsilon(1e-4));
+  CHECK(share_of_reducible(2, 5, 1, 1.5) == -1);
   CHECK(judge(evidence(6, {0.1, 0.2, 1})).verdict == Verdict::Unexplained);
   CHECK(judge(evidence(6, {0.1, 0.2, 0.25})).verdict == Verdict::Unexplained);
   CHECK(judge_effects({}, {evidence(6, {})}, usual_chance()).verdict == Verdict::Unexplained);

@@ -53,7 +53,7 @@ struct EffectStanding {
   double distance = 0;                                ///< that is left then
   double improvement = 0;                             ///< of the distance
   double fall = 0;                                    ///< the same over what is left, see relative_fall
-  double share = 0;  ///< of what is reducible: the distance beyond chance's mean; at most 1
+  double share = 0;  ///< of what is reducible, see share_of_reducible
   double vote = 0;   ///< over all gaps, 1 for the best of each; no probability
 };
 
@@ -179,10 +179,10 @@ inline ChanceLevel chance_level(const std::vector<std::vector<EffectEvidence>>& 
   return level;
 }
 
-/// Of what is more than where nothing is missing, how much less there is after something: at most 1 where more than
-/// that has gone by luck, and at least -1.
-inline double share_of_reducible(double before, double after, double noise) noexcept {
-  return std::clamp((before - after) / std::max(before - noise, 1e-12), -1.0, 1.0);
+/// Of a gap, how much of what is reducible something takes away: at most 1, and at least -1 where it adds to it.
+/// @param noise the gap where nothing is missing. @param best that with whatever makes it least, which may be less.
+inline double share_of_reducible(double before, double after, double noise, double best) noexcept {
+  return std::clamp((before - after) / std::max(before - std::min(noise, best), 1e-12), -1.0, 1.0);
 }
 
 /// Judges effects by what one or more recordings say, all of which have the effect at one strength.
@@ -211,7 +211,6 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
     one.improvement = profile.improvement() / count;
     one.distance = joint.distance - one.improvement;
     one.fall = relative_fall(joint.distance, one.distance);
-    one.share = share_of_reducible(joint.distance, one.distance, chance.distance);
     for (std::size_t component = 0; component < profile.components(); ++component) {
       one.interval.push_back(profile.within(component, std::max(chance.fall * one.distance, 1e-9) * count));
     }
@@ -219,6 +218,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
     result.standings.push_back(std::move(one));
   }
   for (EffectStanding& one : result.standings) {
+    one.share = share_of_reducible(joint.distance, one.distance, chance.distance, joint.distance - best_improvement);
     double votes = 2;
     one.vote = 2 * one.improvement / std::max(best_improvement, 1e-12);
     const auto ask = [&](double by, double best, double by_chance) {

@@ -96,7 +96,7 @@ class EffectRefiner {
       }
       RefinedTogether one;
       one.distance = distance[k];
-      one.share = share_of_reducible(before, one.distance, known.chance.distance);
+      one.share = share_of_reducible(before, one.distance, known.chance.distance, distance[nearest]);
       const Eigen::VectorXd deviation =
           k == nearest ? deviations(points[k], candidates[k].views, known)
                        : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());

@@ -56,7 +56,7 @@ struct GapChange {
   double by_chance = std::numeric_limits<double>::quiet_NaN();   ///< a smaller relative_fall than this is none
   double best_rival = std::numeric_limits<double>::quiet_NaN();  ///< after with the best other effect of those refined
 
-  double share() const noexcept { return share_of_reducible(before, after, noise); }
+  double share() const noexcept { return share_of_reducible(before, after, noise, after); }
 };
 
 /// What was found.
