@@ -14,7 +14,7 @@
 
 #include <decant/io/progress.hpp>
 
-#include "support/effect_twin.hpp"
+#include "support/effect_recording.hpp"
 #include "support/tool.hpp"
 
 int main(int count, char** values) {
@@ -34,7 +34,9 @@ int main(int count, char** values) {
   app.add_option("--out", out, "new folder for the recordings a and b");
   app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
       ->transform(CLI::CheckedTransformer(example::case_ranges()));
-  app.add_option("--kind", kind, "moderate, weak, nothing, outside (what no method is told of) or measurement")
+  app.add_option("--kind", kind,
+                 "moderate, weak, nothing, outside (what no method is told of), measurement or cylinder (one that a "
+                 "robot moves)")
       ->transform(CLI::CheckedTransformer(example::case_kinds()));
   auto* numbered = app.add_option("--case", number, "number of the case, from 0 on")->check(CLI::Range(0, 1000000));
   app.add_flag("--list", list, "names the cases of a kind and their scenarios, and records nothing");
@@ -78,8 +80,8 @@ int main(int count, char** values) {
     for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
       const std::string pour = which == 0 ? "a" : "b";
       if (pours == "both" || pours == pour) {
-        example::record_effect_pour(hidden, which, std::filesystem::path(out) / pour, settings,
-                                    [&](double share) { progress.update(done + share); });
+        example::record_case(hidden, which, std::filesystem::path(out) / pour, settings,
+                             [&](double share) { progress.update(done + share); });
         ++done;
       }
     }

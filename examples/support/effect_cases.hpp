@@ -16,6 +16,7 @@
 #include <decant/core/expects.hpp>
 #include <decant/core/types.hpp>
 
+#include "cylinder_scenarios.hpp"
 #include "effect_scenarios.hpp"
 
 namespace example {
@@ -27,11 +28,12 @@ enum class CaseRange {
 };
 
 enum class CaseKind {
-  Moderate,    ///< an effect that a method may know of, as strong as it is easily seen
-  Weak,        ///< the same, half as strong
-  Nothing,     ///< only what is tolerated
-  Outside,     ///< something that no method is told of
-  Measurement  ///< the liquid is as the model has it, the measurement is not
+  Moderate,     ///< an effect that a method may know of, as strong as it is easily seen
+  Weak,         ///< the same, half as strong
+  Nothing,      ///< only what is tolerated
+  Outside,      ///< something that no method is told of
+  Measurement,  ///< the liquid is as the model has it, the measurement is not
+  Cylinder      ///< an effect in a cylinder that a robot moves, or an error of the measurement; heights alone are read
 };
 
 /// A kind of effect, and how strong it is where it is moderate.
@@ -41,12 +43,13 @@ struct EffectEntry {
   const char* unit;
   double least = 0, most = 0;
   bool either_sign = false;
+  bool thins_in_turn = false;  ///< every other one is shear_thinning
 };
 
 inline const std::vector<EffectEntry>& hidden_effects() {
   static const std::vector<EffectEntry> entries{
       {"drag_quadratic", "drag", "1/m", 0.9, 1.5},
-      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3},  // over that of water; in turn with shear_thinning
+      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3, false, true},  // over that of water
       {"surface_tension", "surface_tension", "N/m", 0.15, 0.30},
       {"wall_friction", "wall_friction", "1/s", 20, 50},   // at a spacing of 5 mm
       {"wall_adhesion", "wall_adhesion", "m/s^2", 8, 18},  // at a spacing of 5 mm
@@ -86,6 +89,18 @@ inline const std::vector<EffectEntry>& outside_effects() {
       {"puff", "outside", "m/s^2", 25, 38},
       {"shaking_table", "outside", "m/s^2", 2, 3},
       {"sliding_pan", "outside", "mm", 20, 30},
+  };
+  return entries;
+}
+
+/// What the highest point of moved water may tell.
+inline const std::vector<EffectEntry>& cylinder_effects() {
+  static const std::vector<EffectEntry> entries{
+      {"lateral_force", "lateral_force", "m/s^2", 0.5, 0.8},  // a table that leans by 3 to 5 degrees
+      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3},
+      {"wall_friction", "wall_friction", "1/s", 20, 50},  // at a spacing of 5 mm
+      {"fill", "fill", "share", 0.12, 0.14, true},
+      {"latency", "latency", "s", 0.050, 0.070, true},
   };
   return entries;
 }
@@ -141,6 +156,8 @@ inline const char* word(CaseKind kind) {
       return "nothing";
     case CaseKind::Outside:
       return "outside";
+    case CaseKind::Cylinder:
+      return "cylinder";
     default:
       return "measurement";
   }
@@ -157,16 +174,21 @@ inline const std::vector<EffectEntry>& entries_of(CaseKind kind) {
       return outside_effects();
     case CaseKind::Measurement:
       return measurement_errors();
+    case CaseKind::Cylinder:
+      return cylinder_effects();
     default:
       return none;
   }
 }
 
-/// The scenarios of a range, in turn.
-inline std::vector<std::size_t> scenarios_of(CaseRange range) {
+/// The scenarios of a range, in turn: numbers of effect_scenarios() or, for CaseKind::Cylinder, cylinder_scenarios().
+inline std::vector<std::size_t> scenarios_of(CaseRange range, CaseKind kind) {
   std::vector<std::size_t> scenarios;
-  const std::size_t end = range == CaseRange::Develop ? scenarios_to_develop : effect_scenarios().size();
-  for (std::size_t k = range == CaseRange::Develop ? 0 : scenarios_to_develop; k < end; ++k) {
+  const bool moved = kind == CaseKind::Cylinder;
+  const std::size_t all = moved ? cylinder_scenarios().size() : effect_scenarios().size();
+  const std::size_t developed = moved ? cylinder_scenarios_to_develop : scenarios_to_develop;
+  const std::size_t end = range == CaseRange::Develop ? developed : all;
+  for (std::size_t k = range == CaseRange::Develop ? 0 : developed; k < end; ++k) {
     scenarios.push_back(k);
   }
   return scenarios;
@@ -183,7 +205,7 @@ inline std::uint32_t mixed_seed(std::initializer_list<std::uint32_t> words) {
 
 /// @param turn how often the effect has come up before.
 inline HiddenEffect draw_effect(const EffectEntry& of, double factor, int turn, std::uint32_t seed) {
-  const bool thins = turn % 2 == 1 && std::string(of.name) == "viscosity";
+  const bool thins = of.thins_in_turn && turn % 2 == 1;
   const EffectEntry& entry = thins ? shear_thinning : of;
   std::mt19937 random(seed);
   const auto between = [&](double low, double high) {
@@ -248,7 +270,7 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
   hidden.number = number;
   hidden.seed = detail::mixed_seed({range == CaseRange::Develop ? 11U : 9007U, static_cast<std::uint32_t>(kind),
                                     static_cast<std::uint32_t>(number)});
-  std::vector<std::size_t> scenarios = scenarios_of(range);
+  std::vector<std::size_t> scenarios = scenarios_of(range, kind);
   const std::vector<EffectEntry>& entries = entries_of(kind);
   auto place = static_cast<std::size_t>(number);
   if (!entries.empty()) {
@@ -269,7 +291,7 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
 /// How many cases of a kind there are to look at: each effect in each of the range's scenarios, and enough of the
 /// others to count false alarms by.
 inline int usual_cases(CaseRange range, CaseKind kind) {
-  const auto scenarios = static_cast<int>(scenarios_of(range).size());
+  const auto scenarios = static_cast<int>(scenarios_of(range, kind).size());
   const auto effects = static_cast<int>(entries_of(kind).size());
   return kind == CaseKind::Nothing ? 4 * scenarios : effects * scenarios;
 }
@@ -280,11 +302,10 @@ inline const std::map<std::string, CaseRange>& case_ranges() {
   return ranges;
 }
 inline const std::map<std::string, CaseKind>& case_kinds() {
-  static const std::map<std::string, CaseKind> kinds{{"moderate", CaseKind::Moderate},
-                                                     {"weak", CaseKind::Weak},
-                                                     {"nothing", CaseKind::Nothing},
-                                                     {"outside", CaseKind::Outside},
-                                                     {"measurement", CaseKind::Measurement}};
+  static const std::map<std::string, CaseKind> kinds{
+      {"moderate", CaseKind::Moderate},       {"weak", CaseKind::Weak},
+      {"nothing", CaseKind::Nothing},         {"outside", CaseKind::Outside},
+      {"measurement", CaseKind::Measurement}, {"cylinder", CaseKind::Cylinder}};
   return kinds;
 }
 

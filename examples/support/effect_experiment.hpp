@@ -22,7 +22,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/version.hpp>
 
-#include "effect_twin.hpp"
+#include "effect_recording.hpp"
 #include "experiment_folder.hpp"
 #include "missing_effect_output.hpp"
 #include "recorded_interaction.hpp"
@@ -79,41 +79,51 @@ class EffectExperiment {
   static std::string recording_name(const EffectCase& of, std::size_t which) {
     return case_name(of) + (which == 0 ? "_a" : "_b");
   }
-  std::size_t frames(const EffectCase& of, std::size_t which) const {
-    const double seconds =
-        std::min(effect_scenarios().at(of.scenario).pours.at(which).duration, options_.recording.longest);
-    return static_cast<std::size_t>(std::max(1L, std::lround(seconds * options_.recording.frames_per_second)));
-  }
-
   ExperimentRecording recording_of(const EffectCase& of, std::size_t which) const {
     const EffectRecordingSettings settings = options_.recording;
-    return {recording_name(of, which), of.seed, settings.spacing, frames(of, which),
+    return {recording_name(of, which), of.seed, reality_spacing(of, settings), case_frames(of, which, settings),
             [of, which, settings](const auto& folder, const auto& progress) {
-              record_effect_pour(of, which, folder, settings, progress);
+              record_case(of, which, folder, settings, progress);
             }};
+  }
+
+  /// Of a case's model. A cylinder holds three times what is poured, and is read more often.
+  InteractionOptions model_of_case(const EffectCase& of) const {
+    InteractionOptions options = options_.model;
+    if (is_of_cylinder(of)) {
+      options.model.spacing *= 2;
+      options.frames_per_second = cylinder_frames_per_second;
+      options.reading_errors["height_mm"] = 1.5;  // of a sensor that errs by less, and of coarse particles
+    }
+    return options;
   }
 
   // What a result depends on, beside the program.
   nlohmann::json settings_json(const EffectCase& of) const {
     return {{"case", case_name(of)},
             {"both", options_.both},
-            {"model_spacing_mm", 1e3 * options_.model.model.spacing},
-            {"reality_spacing_mm", 1e3 * options_.recording.spacing},
+            {"model_spacing_mm", 1e3 * model_of_case(of).model.spacing},
+            {"reality_spacing_mm", 1e3 * reality_spacing(of, options_.recording)},
             {"draws", options_.search.dictionary.draws},
             {"longest_s", number_json(options_.recording.longest)}};
   }
 
   nlohmann::json judge(const EffectCase& of) {
+    InteractionOptions options = model_of_case(of);
+    decant::MissingEffectSettings search = options_.search;
+    search.evidence.readings.window = std::min(search.evidence.readings.window, 2 / options.frames_per_second);
     std::vector<RecordedInteraction> kept;
     for (const std::size_t which : {0, 1}) {
-      kept.push_back(
-          recorded_interaction(decant::read_recording(folder_.recording(recording_name(of, which))), options_.model));
+      decant::Recording recording = decant::read_recording(folder_.recording(recording_name(of, which)));
+      options.gain_of = uncertain_gains(recording);
+      kept.push_back(recorded_interaction(std::move(recording), options));
     }
     std::vector<decant::Interaction<RecordedModel>> learn{kept[0].interaction("a")}, held_out;
     (options_.both ? learn : held_out).push_back(kept[1].interaction("b"));
-    decant::Journal journal(options_.folder / "runs" / ("scenario_" + std::to_string(of.scenario) + ".journal"),
+    const std::string scenario = (is_of_cylinder(of) ? "cylinder_" : "scenario_") + std::to_string(of.scenario);
+    decant::Journal journal(options_.folder / "runs" / (scenario + ".journal"),
                             std::string("effect_experiment of decant ") + DECANT_VERSION + " at " +
-                                decant::detail::number_text(1e3 * options_.model.model.spacing) + " mm");
+                                decant::detail::number_text(1e3 * options.model.spacing) + " mm");
     std::size_t computed = 0;
     const decant::RunJobs run_jobs = [&](const std::vector<std::string>& keys,
                                          const std::function<decant::JobResult(std::size_t)>& work) {
@@ -125,8 +135,7 @@ class EffectExperiment {
     {
       const decant::Stopwatch watch(milliseconds);
       found =
-          decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs, options_.search)
-              .find();
+          decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs, search).find();
     }
     nlohmann::json json = missing_effect_json(found.judged, found, kept[0].recording.gravity);
     json["status"] = "ok";

@@ -92,6 +92,54 @@ struct EffectRealityParts : RealityParts<PressureSolverType> {
 /// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
 inline constexpr double spacing_of_strengths = 0.005;
 
+/// Of a reality with what is hidden and what is tolerated.
+inline decant::SimulatorSettings effect_reality_settings(const HiddenEffect& effect, const ToleratedErrors& errors,
+                                                         double spacing) {
+  decant::SimulatorSettings settings;
+  settings.spacing = spacing;
+  settings.threads = {1};
+  settings.gravity *= 1 + (effect.is("gravity") ? effect.strength : 0);
+  settings.gravity += errors.pull;
+  settings.liquid.dynamic_viscosity += effect.is("viscosity") ? effect.strength * settings.liquid.density : 0;
+  settings.liquid.surface_tension = effect.is("surface_tension") ? effect.strength : 0;
+  // between those that are handed in and for_tracking's
+  settings.courant_number = 1;
+  settings.stability_number = 0.35;
+  settings.tolerance_factor = 1.5;
+  return settings;
+}
+
+/// Gives a reality the forces of what is hidden under which liquid comes to rest before the recording begins.
+template <class Model>
+void set_lasting_forces(const HiddenEffect& effect, Model& model) {
+  using namespace decant;
+  const auto strength_if = [&](const char* name) { return effect.is(name) ? effect.strength : 0; };
+  const double layers = spacing_of_strengths / model.spacing();
+  if (effect.is("shear_thinning")) {  // other than catalogues have it
+    ShearThinningViscosity<float>& friction = model.template force<ShearThinningViscosity<float>>();
+    friction.high_shear_viscosity = friction.kinematic_viscosity;
+    friction.kinematic_viscosity += static_cast<float>(effect.strength);
+    friction.relaxation_time = 0.05F;
+    friction.exponent = 0.45F;
+  }
+  model.template force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
+  model.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
+  model.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
+  model.template force<WallAdhesion<float>>().strength =
+      static_cast<float>(layers * layers * strength_if("wall_adhesion"));
+}
+
+/// Pulls a reality's liquid sideways, from now on or, in the variant "window", for a while.
+template <class Model>
+void pull_sideways(const HiddenEffect& effect, Model& model) {
+  auto& pull = model.template force<decant::BodyAcceleration<float>>();
+  pull.pull = (effect.strength * effect.level_direction()).template cast<float>();
+  if (effect.variant == "window") {
+    pull.from = effect.onset;
+    pull.until = effect.until;
+  }
+}
+
 /// What really happens in one pour of a case.
 template <class PressureSolverType>
 class EffectReality {
@@ -107,11 +155,15 @@ class EffectReality {
         errors_(tolerated_errors(hidden, which)),
         container_motion_(true_container_motion(RecordedMotion(hidden.scenario, which))),
         pan_motion_(true_pan_motion()),
-        model_(true_settings(spacing)) {
+        model_(effect_reality_settings(effect, errors_, spacing)) {
     using namespace decant;
     container_body_ = model_.add_body("container", container_.shape, PoseTrack(container_motion_.at(0)));
     pan_body_ = model_.add_body("pan", scenario_.pan.shape(), pan_motion_);
-    set_lasting_forces();
+    set_lasting_forces(effect_, model_);
+    if (effect_.is("lateral_force", "steady")) {
+      pull_sideways(effect_, model_);
+      description_["direction"] = vector_json(effect_.level_direction());
+    }
     const double amount = (1 + errors_.fill) * (1 + (effect_.is("fill") ? effect_.strength : 0));
     if constexpr (std::is_same_v<PressureSolverType, Dfsph<float>>) {
       initial_volume_ = fill(model_, container_body_, FillAmount::volume(amount * recorded_volume)).volume;
@@ -158,21 +210,6 @@ class EffectReality {
   static constexpr float lowest_seen = -0.3F;  // [m]
   static constexpr double samples_per_second = 200;
 
-  decant::SimulatorSettings true_settings(double spacing) const {
-    decant::SimulatorSettings settings;
-    settings.spacing = spacing;
-    settings.threads = {1};
-    settings.gravity *= 1 + (effect_.is("gravity") ? effect_.strength : 0);
-    settings.gravity += errors_.pull;
-    settings.liquid.dynamic_viscosity += effect_.is("viscosity") ? effect_.strength * settings.liquid.density : 0;
-    settings.liquid.surface_tension = effect_.is("surface_tension") ? effect_.strength : 0;
-    // between those that are handed in and for_tracking's
-    settings.courant_number = 1;
-    settings.stability_number = 0.35;
-    settings.tolerance_factor = 1.5;
-    return settings;
-  }
-
   decant::PoseTrack true_container_motion(const RecordedMotion& recorded) const {
     const double late = errors_.latency + (effect_.is("latency") ? effect_.strength : 0);
     std::vector<decant::PoseTrack::Sample> samples;
@@ -204,33 +241,12 @@ class EffectReality {
     return decant::PoseTrack({{effect_.onset, pose}, {effect_.until, there}});
   }
 
-  double strength_if(const char* name) const { return effect_.is(name) ? effect_.strength : 0; }
-
-  // Under which liquid comes to rest before the recording begins.
-  void set_lasting_forces() {
-    using namespace decant;
-    const double layers = spacing_of_strengths / model_.spacing();
-    if (effect_.is("shear_thinning")) {  // other than catalogues have it
-      ShearThinningViscosity<float>& friction = model_.template force<ShearThinningViscosity<float>>();
-      friction.high_shear_viscosity = friction.kinematic_viscosity;
-      friction.kinematic_viscosity += static_cast<float>(effect_.strength);
-      friction.relaxation_time = 0.05F;
-      friction.exponent = 0.45F;
-    }
-    model_.template force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
-    model_.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
-    model_.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
-    model_.template force<WallAdhesion<float>>().strength =
-        static_cast<float>(layers * layers * strength_if("wall_adhesion"));
-    if (effect_.is("lateral_force", "steady")) {
-      pull_sideways(0, 0);
-    }
-  }
-
   void set_passing_forces() {
     using namespace decant;
     if (effect_.is("lateral_force", "window")) {
-      pull_sideways(effect_.onset, effect_.until);
+      pull_sideways(effect_, model_);
+      description_["direction"] = vector_json(effect_.level_direction());
+      say_window();
     } else if (effect_.is("suction")) {
       // beside the jet, so that it is drawn aside and not caught
       const Vector3<double> point =
@@ -348,18 +364,6 @@ class EffectReality {
           0.5 * scenario_.pan.radius * effect_.side * scenario_.across() + 0.005 * effect_.displacement);
       model_.add_body("bump", Sphere{foot + Vector3<double>(0, 0, height - radius), radius}, pan_motion_);
       say("pan", foot);
-    }
-  }
-
-  void pull_sideways(double from, double until) {
-    auto& pull = model_.template force<decant::BodyAcceleration<float>>();
-    const decant::Vector3<double> direction = effect_.level_direction();
-    pull.pull = (effect_.strength * direction).cast<float>();
-    description_["direction"] = vector_json(direction);
-    if (until > from) {
-      pull.from = from;
-      pull.until = until;
-      say_window();
     }
   }
 

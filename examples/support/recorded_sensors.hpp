@@ -60,15 +60,13 @@ inline std::string kind_of_channel(const std::string& name) { return name.substr
 /// What readings are off by as a rule, a model of particles included, and for how long: in kg, m and Pa.
 /// @param channel as the format names it, without its place. Throws std::runtime_error for one that is not compared.
 inline decant::ReadingError usual_reading_error(const std::string& channel) {
-  static const std::map<std::string, decant::ReadingError> usual{{"target_mass_g", {2e-3, 0.3}},
-                                                                 {"level_mm", {3e-3, 0.3}},
-                                                                 {"front_mm", {6e-3, 0.3}},
-                                                                 {"top_mm", {3e-3, 0.3}},
-                                                                 {"pressure_pa", {150, 0.1}}};
+  static const std::map<std::string, decant::ReadingError> usual{
+      {"target_mass_g", {2e-3, 0.3}}, {"level_mm", {3e-3, 0.3}},  {"front_mm", {6e-3, 0.3}},
+      {"top_mm", {3e-3, 0.3}},        {"height_mm", {3e-3, 0.3}}, {"pressure_pa", {150, 0.1}}};
   const auto found = usual.find(channel);
   if (found == usual.end()) {
     throw std::runtime_error("error of '" + channel +
-                             "': expected one of target_mass_g, level_mm, front_mm, top_mm and pressure_pa");
+                             "': expected one of target_mass_g, level_mm, front_mm, top_mm, height_mm and pressure_pa");
   }
   return found->second;
 }
@@ -79,7 +77,7 @@ inline std::set<std::string> uncertain_gains(const decant::Recording& recording)
   std::set<std::string> kinds;
   for (const decant::recording::Channel& channel : recording.measurements.channels) {
     const std::string kind = kind_of_channel(channel.name);
-    if (kind == "level_mm" || kind == "front_mm" || kind == "top_mm" || kind == "pressure_pa") {
+    if (kind == "level_mm" || kind == "front_mm" || kind == "top_mm" || kind == "height_mm" || kind == "pressure_pa") {
       kinds.insert(kind);
     }
   }
@@ -87,8 +85,9 @@ inline std::set<std::string> uncertain_gains(const decant::Recording& recording)
 }
 
 /// The sensors of a recording as a simulation has them, and what they read in some frames. Beside the channels that the
-/// format lists there is top_mm@BODY: the liquid's highest point along a body's z axis above what that was in the first
-/// frame. Others are passed over. Where a simulation has no liquid, a sensor reads what it reads at least.
+/// format lists there are height_mm@BODY, the liquid's highest point along a body's z axis, and top_mm@BODY, the same
+/// above what it was in the first frame. Others are passed over. Where a simulation has no liquid, a sensor reads what
+/// it reads at least.
 /// @param times of the frames [s]. @param errors by channel, as the format names them and in its units: standard
 /// deviations in place of the usual ones. Throws std::runtime_error for errors of channels that there are not, and for
 /// the top in a body that there is not.
@@ -119,7 +118,8 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
   std::vector<InteractionSensor<Model>> sensors;
   std::vector<ReadingSeries> readings;
   for (const recording::Channel& channel : recording.measurements.channels) {
-    const bool of_top = channel.quantity == Quantity::Other && channel.name.starts_with("top_mm@");
+    const bool of_top = channel.quantity == Quantity::Other &&
+                        (channel.name.starts_with("top_mm@") || channel.name.starts_with("height_mm@"));
     if (channel.quantity == Quantity::Other && !of_top) {
       continue;
     }
@@ -173,7 +173,7 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
       for (double& value : values) {
         value *= 1e-3;  // the reader does not know its unit
       }
-      sensor.from_first = true;
+      sensor.from_first = kind == "top_mm";
       sensor.read = [gauges, id = static_cast<BodyId>(*body)](Model& model) {
         const auto& in = model.bodies()[id];
         return gauges(model).top(in.motion.at(model.time()), in.bounds).value_or(in.bounds.min().z());

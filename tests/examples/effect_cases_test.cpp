@@ -4,6 +4,7 @@
 
 #include "../../examples/support/effect_cases.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -15,6 +16,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <Eigen/Geometry>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/cavity.hpp>
@@ -30,7 +33,8 @@ using namespace example;
 namespace {
 
 constexpr std::array both_ranges{CaseRange::Develop, CaseRange::Report};
-constexpr std::array kinds_of_effects{CaseKind::Moderate, CaseKind::Weak, CaseKind::Outside, CaseKind::Measurement};
+constexpr std::array kinds_of_effects{CaseKind::Moderate, CaseKind::Weak, CaseKind::Outside, CaseKind::Measurement,
+                                      CaseKind::Cylinder};
 
 /// One particle, as a force sees it.
 struct LoneParticle {
@@ -82,6 +86,11 @@ TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is
   CHECK(seeds.size() == cases);
   CHECK(scenarios[CaseRange::Develop] == std::set<std::size_t>{0, 1, 2, 3, 4});
   CHECK(scenarios[CaseRange::Report] == std::set<std::size_t>{5, 6, 7, 8});
+  const auto cylinders = [](CaseRange range) { return scenarios_of(range, CaseKind::Cylinder); };
+  CHECK(cylinders(CaseRange::Develop) == std::vector<std::size_t>{0, 1});
+  CHECK(cylinders(CaseRange::Report) == std::vector<std::size_t>{2, 3, 4, 5, 6});
+  CHECK(effect_case(CaseRange::Develop, CaseKind::Cylinder, 3).seed !=
+        effect_case(CaseRange::Report, CaseKind::Cylinder, 3).seed);
   CHECK_THROWS_AS(effect_case(CaseRange::Develop, CaseKind::Weak, -1), std::invalid_argument);
   CHECK_THROWS_AS(reference_case(effect_scenarios().size(), 1), std::invalid_argument);
 }
@@ -90,7 +99,7 @@ TEST_CASE("effect cases: each effect comes equally often and in all scenarios, a
   for (const CaseRange range : both_ranges) {
     for (const CaseKind kind : kinds_of_effects) {
       const std::vector<EffectEntry>& entries = entries_of(kind);
-      const std::size_t rounds = 20 * scenarios_of(range).size();
+      const std::size_t rounds = 20 * scenarios_of(range, kind).size();
       std::map<std::string, std::map<std::size_t, std::size_t>> found;
       std::map<std::string, std::set<bool>> signs;
       std::size_t thinning = 0;
@@ -119,7 +128,7 @@ TEST_CASE("effect cases: each effect comes equally often and in all scenarios, a
             CHECK(effect_container(effect_scenarios()[scenario].pours[0].container).neck);
           }
         } else {
-          CHECK(found[entry.name].size() == scenarios_of(range).size());
+          CHECK(found[entry.name].size() == scenarios_of(range, kind).size());
           for (const auto& [scenario, times] : found[entry.name]) {
             CHECK(times == 20);
           }
@@ -178,6 +187,32 @@ TEST_CASE("effect scenarios: the lip stays in place, at rest for a quarter of a 
       // the container's axis leans by the plan's last tilt, but for the tremor's 2 degrees
       const double tilt = std::acos((motion.smooth(plan.duration).rotation * Eigen::Vector3d::UnitZ()).z());
       CHECK(std::abs(tilt * 180 / std::numbers::pi - plan.tilt.back().tilt_deg) < 2);
+    }
+  }
+}
+
+TEST_CASE("cylinder scenarios: paths lead from rest to rest, smoothly, and slosh what is in the cylinder") {
+  for (const CylinderScenario& scenario : cylinder_scenarios()) {
+    for (const CylinderPath& path : scenario.paths) {
+      const double step = 1e-3;
+      const auto place = [&](double time) { return path.at(time).translation; };
+      const auto acceleration = [&](double time) {
+        return decant::Vector3<double>((place(time + step) - 2 * place(time) + place(time - step)) / (step * step));
+      };
+      CHECK(place(path.rest).norm() == 0);
+      CHECK(path.at(path.rest).rotation.angularDistance(Eigen::Quaterniond::Identity()) == Approx(0).margin(1e-9));
+      CHECK(place(path.rest + path.moving).norm() < 1e-9);
+      CHECK(place(path.duration()).norm() < 1e-9);
+      const Eigen::Quaterniond turned(Eigen::AngleAxisd(path.turn, Eigen::Vector3d::UnitZ()));
+      CHECK(path.at(path.duration()).rotation.angularDistance(turned) == Approx(0).margin(1e-6));
+      double strongest = 0, jump = 0;
+      for (double time = step; time < path.duration(); time += step) {
+        strongest = std::max(strongest, acceleration(time).head<2>().norm());
+        jump = std::max(jump, (acceleration(time + step) - acceleration(time)).norm());
+      }
+      CHECK(strongest > 1);  // the surface leans by a tenth at least
+      CHECK(strongest < 6);  // and liquid stays in
+      CHECK(jump < 0.15);
     }
   }
 }
@@ -325,7 +360,7 @@ TEST_CASE("first sight: from when on a square differs for good, and where") {
   }
   CHECK(seen(7, 23, 20, true)->time == Approx(8 / 30.0));  // a quarter of the window before
   CHECK(seen(6, 23, 20, true)->time == Approx(4 / 30.0));  // a half
-  CHECK_FALSE(seen(8, 11, 20, true).has_value());  // a drop
+  CHECK_FALSE(seen(8, 11, 20, true).has_value());          // a drop
   CHECK_FALSE(seen(8, 23, 5, true).has_value());
   CHECK(seen(8, 23, 7, true).has_value());
 }

@@ -122,6 +122,11 @@ TEST_CASE("recorded sensors: the top of liquid is told from the body, and by how
   }
   CHECK(sensors[0].read(model) == Approx(0.03).margin(0.002));
 
+  recording.measurements.channels[0].name = "height_mm@pan";
+  const auto height = sensors_of({}).first;
+  REQUIRE(height.size() == 1);
+  CHECK(!height[0].from_first);
+  CHECK(height[0].read(model) == sensors[0].read(model));
   recording.measurements.channels[0].name = "top_mm@cup";
   CHECK_THROWS_WITH(sensors_of({}), decant_test::contains("top_mm@cup: expected the name of a body"));
 }
