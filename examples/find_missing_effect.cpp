@@ -102,8 +102,6 @@ int main(int count, char** values) {
     options.model.spacing = 1e-3 * spacing_mm;
     options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
     options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
-    double& window = settings.evidence.readings.window;
-    window = std::min(window, 2 / options.frames_per_second);
     std::map<std::string, decant::Recording> recordings;
     for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders}) {
       for (const std::string& folder : *folders) {
@@ -150,7 +148,8 @@ int main(int count, char** values) {
     {
       const decant::Stopwatch watch(milliseconds);
       result = decant::MissingEffectSearch<example::RecordedModel>(std::move(learn), std::move(held_out), run_jobs,
-                                                                   settings, std::move(references))
+                                                                   example::search_settings(settings, options),
+                                                                   std::move(references))
                    .find();
     }
     progress.finish();

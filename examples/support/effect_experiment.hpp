@@ -79,6 +79,7 @@ class EffectExperiment {
   static std::string recording_name(const EffectCase& of, std::size_t which) {
     return case_name(of) + (which == 0 ? "_a" : "_b");
   }
+
   ExperimentRecording recording_of(const EffectCase& of, std::size_t which) const {
     const EffectRecordingSettings settings = options_.recording;
     return {recording_name(of, which), of.seed, reality_spacing(of, settings), case_frames(of, which, settings),
@@ -110,8 +111,6 @@ class EffectExperiment {
 
   nlohmann::json judge(const EffectCase& of) {
     InteractionOptions options = model_of_case(of);
-    decant::MissingEffectSettings search = options_.search;
-    search.evidence.readings.window = std::min(search.evidence.readings.window, 2 / options.frames_per_second);
     std::vector<RecordedInteraction> kept;
     for (const std::size_t which : {0, 1}) {
       decant::Recording recording = decant::read_recording(folder_.recording(recording_name(of, which)));
@@ -134,8 +133,9 @@ class EffectExperiment {
     decant::MissingEffect found;
     {
       const decant::Stopwatch watch(milliseconds);
-      found =
-          decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs, search).find();
+      found = decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs,
+                                                         search_settings(options_.search, options))
+                  .find();
     }
     nlohmann::json json = missing_effect_json(found.judged, found, kept[0].recording.gravity);
     json["status"] = "ok";

@@ -116,7 +116,8 @@ struct EffectScore {
   double gap(const char* key) const { return number_at(*result, std::string("/gap/") + key); }
   /// Of what is reducible of the gap of the pour that was not used.
   double held_out_share() const {
-    return (gap("held_out_before") - gap("held_out_after")) / (gap("held_out_before") - gap("held_out_noise"));
+    return decant::share_of_reducible(gap("held_out_before"), gap("held_out_after"), gap("held_out_noise"),
+                                      gap("held_out_after"));
   }
 
  private:

@@ -289,6 +289,14 @@ struct RecordedInteraction {
   }
 };
 
+/// What a search takes for its settings: readings are averaged over two of the frames that are compared, at most.
+inline decant::MissingEffectSettings search_settings(decant::MissingEffectSettings settings,
+                                                     const InteractionOptions& options) {
+  double& window = settings.evidence.readings.window;
+  window = std::min(window, 2 / options.frames_per_second);
+  return settings;
+}
+
 /// Throws std::invalid_argument and std::runtime_error for recordings in which nothing was seen or read, or with an
 /// amount that is not known, and for tolerances of effects that there are not.
 inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
