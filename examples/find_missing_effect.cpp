@@ -16,6 +16,7 @@
 #include <string>
 #include <system_error>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -24,13 +25,13 @@
 #include <decant/core/stopwatch.hpp>
 #include <decant/io/journal.hpp>
 #include <decant/io/progress.hpp>
-#include <decant/io/recording_reader.hpp>
 #include <decant/version.hpp>
 
 #include "support/missing_effect_output.hpp"
 #include "support/missing_effect_report.hpp"
 #include "support/recorded_interaction.hpp"
 #include "support/result_file.hpp"
+#include "support/scene_interaction.hpp"
 #include "support/sweep_executor.hpp"
 #include "support/tool.hpp"
 
@@ -64,11 +65,14 @@ int main(int count, char** values) {
   std::vector<std::string> learn_folders, held_out_folders, reference_folders, tolerances, reading_errors;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
-  double spacing_mm = 1e3 * options.model.spacing;
+  double usual_spacing_mm = 1e3 * options.model.spacing;
+  std::optional<double> spacing_mm;
   const double usual_rate = options.frames_per_second;
   int threads = 0;
   CLI::App app("Finds which effect a simulation lacks, how strong it is, and whether other recordings agree.");
-  app.add_option("--learn", learn_folders, "folders of recordings that have it, format version 1")->required();
+  app.add_option("--learn", learn_folders,
+                 "folders of recordings that have it, format version 1; or of scenes: scene.json and measurements.csv")
+      ->required();
   app.add_option("--held-out", held_out_folders, "folders of other recordings that have it, to check on");
   app.add_option(
       "--reference", reference_folders,
@@ -86,7 +90,9 @@ int main(int count, char** values) {
                  "standard deviations of what sensors read, a model of particles included, such as target_mass_g=2 or "
                  "level_mm=3, in the channel's unit; several by commas")
       ->delimiter(',');
-  app.add_option("--spacing-mm", spacing_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
+  app.add_option("--spacing-mm", spacing_mm,
+                 "of the model's particles: 5 unless given, for scenes what the first one to learn from says")
+      ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--frames-per-second", options.frames_per_second,
                  "of those that are compared; sensors are read in them")
       ->check(CLI::Range(1.0, 1000.0));
@@ -99,22 +105,26 @@ int main(int count, char** values) {
     example::SweepExecutor executor = example::sweep_executor(threads);
     example::in_first_process(executor, [&] { example::expect_writable({json_file, report_file}); });
     example::expect_apart(learn_folders, held_out_folders, reference_folders);
-    options.model.spacing = 1e-3 * spacing_mm;
     options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
     options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
-    std::map<std::string, decant::Recording> recordings;
+    std::map<std::string, example::InteractionSource> sources;
     for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders}) {
       for (const std::string& folder : *folders) {
-        recordings[folder] = decant::read_recording(folder);
-        options.gain_of.merge(example::uncertain_gains(recordings[folder]));
+        sources[folder] = example::read_interaction_source(folder);
+        options.gain_of.merge(example::uncertain_gains(example::recording_of(sources[folder])));
       }
     }
+    if (const auto* scene = std::get_if<example::MeasuredScene>(&sources[learn_folders.front()])) {
+      usual_spacing_mm = 1e3 * scene->scene.spacing;
+    }
+    const double model_mm = spacing_mm.value_or(usual_spacing_mm);
+    options.model.spacing = 1e-3 * model_mm;
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
     const auto interactions_of = [&](const std::vector<std::string>& folders) {
       Interactions interactions;
       for (const std::string& folder : folders) {
-        kept.push_back(std::make_unique<example::RecordedInteraction>(
-            example::recorded_interaction(recordings.at(folder), options)));
+        kept.push_back(
+            std::make_unique<example::RecordedInteraction>(example::interaction_of(sources.at(folder), options)));
         interactions.push_back(kept.back()->interaction(folder));
       }
       return interactions;
@@ -134,7 +144,7 @@ int main(int count, char** values) {
     if (!journal_file.empty()) {
       journal.emplace(executor, journal_file,
                       std::string("find_missing_effect of decant ") + DECANT_VERSION + " at " +
-                          decant::detail::number_text(spacing_mm) + " mm" +
+                          decant::detail::number_text(model_mm) + " mm" +
                           (options.frames_per_second == usual_rate
                                ? ""
                                : ", " + decant::detail::number_text(options.frames_per_second) + " frames a second"));
@@ -182,7 +192,7 @@ int main(int count, char** values) {
       if (!json_file.empty()) {
         nlohmann::json json = example::missing_effect_json(result.judged, result, kept.front()->recording.gravity);
         json["seconds"] = 1e-3 * milliseconds;
-        json["spacing_mm"] = spacing_mm;
+        json["spacing_mm"] = model_mm;
         json["references"] = reference_folders.size();
         json["readings"] = example::readings_json(models, interactions);
         example::write_result(json_file, json);

@@ -55,31 +55,39 @@ struct InteractionOptions {
 
 namespace detail {
 
-/// All that a model's predictions depend on, as a short text: the recording but for its name, its images and its truth,
-/// and what its model can be given. Recordings that differ in nothing else share their model's runs. A 64-bit hash
-/// (FNV-1a).
-inline std::string fingerprint(const decant::Recording& recording, const RecordedModel& model) {
+inline std::string text_of_file(const std::filesystem::path& file) {
+  return decant::detail::read_text_file(file, std::uintmax_t{1} << 30);
+}
+
+/// What a recording's model is made from: all but its name, its images and its truth.
+inline std::vector<std::string> sources_of(const decant::Recording& recording) {
+  nlohmann::json description = nlohmann::json::parse(text_of_file(recording.folder / "recording.json"));
+  for (const char* key : {"name", "truth", "measurements"}) {
+    description.erase(key);
+  }
+  std::vector<std::string> sources{description.dump()};
+  for (const char* file : {"scene_gt.json", "scene_camera.json"}) {
+    if (std::filesystem::exists(recording.folder / file)) {
+      sources.push_back(text_of_file(recording.folder / file));
+    }
+  }
+  for (const decant::recording::Body& body : recording.bodies) {
+    sources.push_back(text_of_file(recording.folder / body.mesh_file));
+  }
+  return sources;
+}
+
+/// All that a model's predictions depend on, as a short text: what it is made from, and what it can be given. What
+/// differs in nothing else shares its model's runs. A 64-bit hash (FNV-1a).
+inline std::string fingerprint(const std::vector<std::string>& sources, const RecordedModel& model) {
   std::uint64_t hash = 14695981039346656037U;
   const auto add = [&](const std::string& bytes) {
     for (const char byte : bytes) {
       hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211U;
     }
   };
-  const auto text = [&](const std::filesystem::path& file) {
-    return decant::detail::read_text_file(recording.folder / file, std::uintmax_t{1} << 30);
-  };
-  nlohmann::json description = nlohmann::json::parse(text("recording.json"));
-  for (const char* key : {"name", "truth", "measurements"}) {
-    description.erase(key);
-  }
-  add(description.dump());
-  for (const char* file : {"scene_gt.json", "scene_camera.json"}) {
-    if (std::filesystem::exists(recording.folder / file)) {
-      add(text(file));
-    }
-  }
-  for (const decant::recording::Body& body : recording.bodies) {
-    add(text(body.mesh_file));
+  for (const std::string& each : sources) {
+    add(each);
   }
   const auto number = [&](double value) { add(decant::detail::number_text(value) + ' '); };
   for (const decant::Effect& effect : model.effects()) {
@@ -174,9 +182,22 @@ inline std::optional<decant::SilhouetteSeries> seen_by(const decant::Recording& 
   return series;
 }
 
-/// The catalogue, as far as it applies to a recording.
+/// Whether anything moves in a recording.
+inline bool moves(const decant::Recording& recording) {
+  const auto moves_on = [](const decant::recording::Body& body) {
+    const decant::Pose first = body.motion.at(0);
+    return std::any_of(body.motion.samples().begin(), body.motion.samples().end(), [&](const auto& sample) {
+      return sample.pose.translation != first.translation || sample.pose.rotation.coeffs() != first.rotation.coeffs();
+    });
+  };
+  return std::any_of(recording.bodies.begin(), recording.bodies.end(), moves_on);
+}
+
+/// The catalogue, as far as it applies to a recording. @param most_fill how much more liquid there may be at most, over
+/// what is assumed; nothing where that is not asked.
 inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording,
-                                                                        const PourPlaces& places) {
+                                                                        const PourPlaces& places,
+                                                                        std::optional<double> most_fill) {
   using namespace decant;
   auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density, recording.gravity);
   const Vector3<double> up = -recording.gravity.normalized();
@@ -243,16 +264,17 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       of_bodies.push_back(obstacle_effect<EffectModel>(id, inside->floor + half * inside->up, "in the " + body.name));
     }
   }
-  if (recording.liquid.initial) {
-    const double full = recording.liquid.initial->fill_fraction ? 1 / *recording.liquid.initial->fill_fraction : 1.25;
-    effects.push_back(fill_effect<EffectModel>(std::clamp(full, 1.05, 1.25)));
+  if (most_fill) {
+    effects.push_back(fill_effect<EffectModel>(*most_fill));
   }
-  std::vector<std::string> names;
-  for (const recording::Body& body : recording.bodies) {
-    names.push_back(body.name);
+  effects.push_back(moves(recording) ? latency_effect<EffectModel>() : late_start_effect<EffectModel>());
+  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
+    effects.push_back(body_pose_effect<EffectModel>(body, recording.bodies[body].name));
   }
-  for (auto& effect : measurement_effects<EffectModel>(names)) {
-    effects.push_back(std::move(effect));
+  if (!recording.cameras.empty()) {
+    for (auto& effect : camera_effects<EffectModel>()) {
+      effects.push_back(std::move(effect));
+    }
   }
   for (auto& effect : of_bodies) {
     effects.push_back(std::move(effect));
@@ -273,6 +295,7 @@ struct RecordedInteraction {
   std::vector<std::size_t> frames;   ///< of the recording, that are compared
   std::vector<std::size_t> cameras;  ///< of the recording, whose pictures are compared
   decant::Observation seen;
+  std::string of_model;  ///< all that the model's predictions depend on
 
   /// Their names.
   std::vector<std::string> sensors() const {
@@ -285,7 +308,7 @@ struct RecordedInteraction {
 
   /// @param name by which messages and journals know it.
   decant::Interaction<RecordedModel> interaction(std::string name) const {
-    return {std::move(name), &model, seen, detail::fingerprint(recording, model)};
+    return {std::move(name), &model, seen, of_model};
   }
 };
 
@@ -297,12 +320,16 @@ inline decant::MissingEffectSettings search_settings(decant::MissingEffectSettin
   return settings;
 }
 
-/// Throws std::invalid_argument and std::runtime_error for recordings in which nothing was seen or read, or with an
-/// amount that is not known, and for tolerances of effects that there are not.
-inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
+namespace detail {
+
+/// @param start see InteractionScene. @param most_fill see catalogue_of. @param sources what the model is made from.
+inline RecordedInteraction interaction_of(decant::Recording recording, const InteractionOptions& options,
+                                          decltype(RecordedModel::Scene::start) start, std::optional<double> most_fill,
+                                          const std::vector<std::string>& sources) {
   using namespace decant;
-  std::vector<std::size_t> frames = detail::compared_frames(recording, options.frames_per_second);
-  InteractionScene<EffectModel, DistortedPinholeCamera> scene;
+  std::vector<std::size_t> frames = compared_frames(recording, options.frames_per_second);
+  RecordedModel::Scene scene;
+  scene.start = std::move(start);
   for (const std::size_t frame : frames) {
     scene.times.push_back(recording.timestamps[frame]);
   }
@@ -310,11 +337,11 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     scene.motion.push_back(body.motion);
   }
   Observation seen;
-  const detail::PourPlaces places = detail::pour_places(recording);
+  const PourPlaces places = pour_places(recording);
   const Vector3<double> middle = places.jet.value_or(Vector3<double>::Zero());
   std::vector<std::size_t> cameras;
   for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
-    auto series = detail::seen_by(recording, camera, frames, options.model.cell_px);
+    auto series = seen_by(recording, camera, frames, options.model.cell_px);
     if (!series) {
       continue;
     }
@@ -334,17 +361,7 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
   if (seen.silhouettes.empty() && seen.readings.empty()) {
     throw std::runtime_error(recording.name + ": expected masks or measurements to compare a model with");
   }
-  auto start_of = std::make_shared<Recording>(recording);
-  start_of->liquid.surface_tension = 0;
-  scene.start = [start_of](const SimulatorSettings& solver, double fill) {
-    TrackingOptions tracking;
-    tracking.spacing = solver.spacing;
-    tracking.solver = solver;
-    tracking.threads = 1;
-    tracking.initial_amount_factor = fill;
-    return model_of<EffectParts<float>>(*start_of, tracking);
-  };
-  auto catalogue = detail::catalogue_of(recording, places);
+  auto catalogue = catalogue_of(recording, places, most_fill);
   for (const std::string& kind : options.gain_of) {
     std::vector<std::size_t> sensors;
     for (std::size_t sensor = 0; sensor < scene.sensors.size(); ++sensor) {
@@ -369,7 +386,33 @@ inline RecordedInteraction recorded_interaction(decant::Recording recording, con
     }
   }
   RecordedModel model(std::move(scene), std::move(catalogue), options.model);
-  return {std::move(recording), std::move(model), std::move(frames), std::move(cameras), std::move(seen)};
+  std::string of_model = fingerprint(sources, model);
+  return {std::move(recording), std::move(model), std::move(frames),
+          std::move(cameras),   std::move(seen),  std::move(of_model)};
+}
+
+}  // namespace detail
+
+/// Throws std::invalid_argument and std::runtime_error for recordings in which nothing was seen or read, or with an
+/// amount that is not known, and for tolerances of effects that there are not.
+inline RecordedInteraction recorded_interaction(decant::Recording recording, const InteractionOptions& options) {
+  using namespace decant;
+  const auto start_of = std::make_shared<Recording>(recording);
+  start_of->liquid.surface_tension = 0;
+  auto start = [start_of](const SimulatorSettings& solver, double fill) {
+    TrackingOptions tracking;
+    tracking.spacing = solver.spacing;
+    tracking.solver = solver;
+    tracking.threads = 1;
+    tracking.initial_amount_factor = fill;
+    return model_of<EffectParts<float>>(*start_of, tracking);
+  };
+  std::optional<double> most_fill;
+  if (const auto& initial = recording.liquid.initial) {
+    most_fill = std::clamp(initial->fill_fraction ? 1 / *initial->fill_fraction : 1.25, 1.05, 1.25);
+  }
+  const std::vector<std::string> sources = detail::sources_of(recording);
+  return detail::interaction_of(std::move(recording), options, std::move(start), most_fill, sources);
 }
 
 }  // namespace example

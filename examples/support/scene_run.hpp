@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// Runs a Scene with a simulator of the caller's choice: sets it up, steps it, reads the gauges, keeps pictures and VTK
-/// files. Shared by the tools simulate and replay_motion.
+/// Runs a Scene with a simulator of the caller's choice: steps it, reads the gauges, keeps pictures and VTK files.
+/// Shared by the tools simulate and replay_motion.
 
 #include <algorithm>
 #include <chrono>
@@ -19,24 +19,19 @@
 
 #include <sys/resource.h>
 
-#include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/cavity.hpp>
-#include <decant/boundary/mesh_repair.hpp>
-#include <decant/boundary/shapes.hpp>
-#include <decant/core/expects.hpp>
 #include <decant/core/fluid_state.hpp>
 #include <decant/io/liquid_picture.hpp>
-#include <decant/io/mesh_file.hpp>
 #include <decant/io/png.hpp>
 #include <decant/io/progress.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/scene.hpp>
 #include <decant/io/series_file.hpp>
 #include <decant/io/vtk.hpp>
-#include <decant/simulation/fill.hpp>
 #include <decant/simulation/gauges.hpp>
 #include <decant/simulation/simulator.hpp>
 
+#include "scene_simulator.hpp"
 #include "stands_within.hpp"
 
 namespace example {
@@ -72,56 +67,6 @@ struct RunResult {
 
 namespace detail {
 
-inline decant::Face face_of(decant::scene::Face face) { return static_cast<decant::Face>(face); }
-
-inline std::optional<decant::Face> face_of(const std::optional<decant::scene::Face>& face) {
-  return face ? std::optional<decant::Face>(face_of(*face)) : std::nullopt;
-}
-
-/// The shape of a body in the library's terms; meshes are read and mended. Throws std::runtime_error or
-/// std::invalid_argument with one line about what is wrong with it.
-inline decant::BodyShape shape_of(const decant::scene::Body& body, double spacing) {
-  using namespace decant;
-  if (const auto* box = std::get_if<scene::Box>(&body.shape)) {
-    return BodyShape(Box{box->min, box->max});
-  }
-  if (const auto* sphere = std::get_if<scene::Sphere>(&body.shape)) {
-    return BodyShape(Sphere{sphere->center, sphere->radius});
-  }
-  if (const auto* cylinder = std::get_if<scene::Cylinder>(&body.shape)) {
-    return BodyShape(Cylinder{cylinder->radius, cylinder->height});
-  }
-  if (const auto* room = std::get_if<scene::BoxInside>(&body.shape)) {
-    return BodyShape(BoxInside{room->inner.min, room->inner.max, room->wall, face_of(room->open)});
-  }
-  if (const auto* vessel = std::get_if<scene::CylinderInside>(&body.shape)) {
-    return BodyShape(CylinderInside{vessel->radius, vessel->height, vessel->wall, face_of(vessel->open)});
-  }
-  const auto& file = std::get<scene::Mesh>(body.shape);
-  RepairReport repair;
-  return BodyShape(repaired(scaled(read_mesh(file.file), file.scale), spacing, repair));
-}
-
-/// Places for liquid that fills a box: whole spacings along each axis, stretched to touch both sides. A box that is no
-/// whole number of spacings wide gets as many as fit, and its liquid sinks a little.
-inline decant::PointArray<double> lattice(const decant::scene::Box& box, double spacing) {
-  const decant::Vector3<double> size = box.max - box.min;
-  const Eigen::Array3d count = (size.array() / spacing + 1e-6).floor();
-  decant::expects(count.prod() <= decant::most_particles, "scene: number of particles in a box",
-                  "at most 1e8 at this spacing", count.prod());
-  decant::PointArray<double> places(3, static_cast<decant::Index>(count.prod()));
-  const Eigen::Array3d width = size.array() / count.max(1.0);
-  decant::Index n = 0;
-  for (int z = 0; z < count[2]; ++z) {
-    for (int y = 0; y < count[1]; ++y) {
-      for (int x = 0; x < count[0]; ++x) {
-        places.col(n++) = box.min.array() + (Eigen::Array3d(x, y, z) + 0.5) * width;
-      }
-    }
-  }
-  return places;
-}
-
 /// The most memory that this process has had [MB].
 inline double peak_memory_mb() {
   rusage usage{};
@@ -140,24 +85,16 @@ class SceneRun {
   using Scalar = typename Parts::Scalar;
 
   SceneRun(const decant::Scene& scene, const RunOptions& options)
-      : scene_(scene), options_(options), simulator_(settings()), gauges_(scene.spacing) {
-    const auto begin = Clock::now();
-    set_solver();
-    for (const decant::scene::Body& body : scene.bodies) {
-      const auto slip = body.slip == decant::scene::Slip::None ? decant::Slip::None : decant::Slip::Free;
-      const decant::BodyId added = simulator_.add_body(body.name, shape_of(body, scene.spacing), body.motion, slip);
-      if (std::holds_alternative<decant::scene::Mesh>(body.shape)) {
-        for (const std::string& warning : simulator_.mesh_report(added).warnings) {
-          result_.warnings.push_back("body '" + body.name + "': " + warning);
-          // at once: filling may fail because of it
-          std::fprintf(stderr, "warning: %s\n", result_.warnings.back().c_str());
-        }
-      }
-      prepared_.push_back({});
-    }
-    for (std::size_t k = 0; k < scene.fluid.size(); ++k) {
-      std::visit([&](const auto& fluid) { add_fluid(fluid); }, scene.fluid[k]);
-    }
+      : scene_(scene),
+        options_(options),
+        set_up_(set_up_scene<Parts>(
+            scene, settings(), 1,
+            [](const std::string& warning) { std::fprintf(stderr, "warning: %s\n", warning.c_str()); })),
+        simulator_(set_up_.simulator),
+        gauges_(scene.spacing),
+        prepared_(scene.bodies.size()) {
+    result_.notes = set_up_.notes;
+    result_.warnings = set_up_.warnings;
     prepare_gauges();
     if (options.vtk_folder) {
       vtk_.emplace(*options.vtk_folder);
@@ -165,7 +102,7 @@ class SceneRun {
     if (options.pictures) {
       set_up_pictures();
     }
-    result_.set_up_seconds = seconds_since(begin);
+    result_.set_up_seconds = seconds_since(begin_);
   }
 
   /// Steps to the scene's end or to the first frame that fails.
@@ -215,27 +152,9 @@ class SceneRun {
   }
 
   decant::SimulatorSettings settings() const {
-    decant::SimulatorSettings settings;
-    settings.spacing = scene_.spacing;
-    settings.liquid = {scene_.liquid.density, scene_.liquid.viscosity, scene_.liquid.surface_tension};
-    settings.gravity = scene_.gravity;
-    settings.largest_step = scene_.solver.max_step.value_or(settings.largest_step);
-    settings.courant_number = scene_.solver.cfl.value_or(settings.courant_number);
-    settings.fixed_step = scene_.solver.step.value_or(settings.fixed_step);
+    decant::SimulatorSettings settings = simulator_settings(scene_);
     settings.threads.count = options_.threads;
     return settings;
-  }
-
-  void set_solver() {
-    auto& solver = simulator_.pressure_solver();
-    if constexpr (requires { solver.density_tolerance; }) {
-      solver.density_tolerance =
-          static_cast<Scalar>(scene_.solver.density_error.value_or(static_cast<double>(solver.density_tolerance)));
-    }
-    if constexpr (requires { solver.divergence_tolerance; }) {
-      solver.divergence_tolerance = static_cast<Scalar>(
-          scene_.solver.divergence_error.value_or(static_cast<double>(solver.divergence_tolerance)));
-    }
   }
 
   decant::BodyId id(std::size_t body) const { return static_cast<decant::BodyId>(body); }
@@ -247,60 +166,6 @@ class SceneRun {
                                            ? decant::Vector3<double>(-scene_.gravity.normalized())
                                            : decant::Vector3<double>(decant::Vector3<double>::UnitZ());
     return pose_of(body).rotation.conjugate() * up;
-  }
-
-  void add_fluid(const decant::scene::Box& box) {
-    const decant::PointArray<double> places = lattice(box, scene_.spacing);
-    std::vector<decant::Vector3<double>> kept;
-    for (decant::Index k = 0; k < places.cols(); ++k) {
-      const decant::Vector3<double> x = places.col(k);
-      if (!in_solid(x)) {
-        kept.push_back(x);
-      }
-    }
-    decant::PointArray<Scalar> position(3, static_cast<decant::Index>(kept.size()));
-    for (std::size_t k = 0; k < kept.size(); ++k) {
-      position.col(static_cast<decant::Index>(k)) = kept[k].template cast<Scalar>();
-    }
-    simulator_.add_particles(position, decant::PointArray<Scalar>::Zero(3, position.cols()), origin_++);
-  }
-
-  // Inside of a solid, or nearer to a wall than a particle at rest would be.
-  bool in_solid(const decant::Vector3<double>& x) const {
-    for (std::size_t b = 0; b < simulator_.bodies().size(); ++b) {
-      const auto& body = simulator_.bodies()[id(b)];
-      const decant::Vector3<double> x_in_body = pose_of(b).inverse() * x;
-      for (const decant::SolidPart& part : body.shape->parts) {
-        if (std::visit([&](const auto& solid) { return solid.closest(x_in_body).distance; }, part) <
-            0.3 * scene_.spacing) {
-          return true;
-        }
-      }
-    }
-    return false;
-  }
-
-  void add_fluid(const decant::scene::Fill& fill) {
-    using Amount = decant::scene::Fill::Amount;
-    const decant::FillAmount amount = fill.amount == Amount::Fraction ? decant::FillAmount::fraction(fill.value)
-                                      : fill.amount == Amount::Volume ? decant::FillAmount::volume(fill.value)
-                                                                      : decant::FillAmount::level(fill.value);
-    const decant::FillReport report = decant::fill(simulator_, id(fill.body), amount);
-    result_.notes.push_back("body '" + scene_.bodies[fill.body].name + "' holds " +
-                            decant::detail::fixed_text(1e6 * report.volume, 1) + " of " +
-                            decant::detail::fixed_text(1e6 * report.capacity, 1) + " ml, " +
-                            decant::detail::fixed_text(1e3 * report.level, 1) + " mm deep");
-  }
-
-  void add_fluid(const decant::scene::Inlet& inlet) {
-    decant::InletSettings settings;
-    settings.position = inlet.position;
-    settings.direction = inlet.direction;
-    settings.radius = inlet.radius;
-    for (const auto& flow : inlet.flow) {
-      settings.flow.emplace_back(flow.time, flow.rate);
-    }
-    simulator_.add_inlet(settings, origin_++);
   }
 
   void prepare_gauges() {
@@ -482,13 +347,14 @@ class SceneRun {
 
   double shade_speed() const { return options_.pictures_follow ? 1.0 : 2.0; }  // [m/s]
 
+  Clock::time_point begin_ = Clock::now();
   decant::Scene scene_;
   RunOptions options_;
-  decant::Simulator<Parts> simulator_;
+  SceneSetUp<Parts> set_up_;
+  decant::Simulator<Parts>& simulator_;  // of set_up_
   decant::Gauges<Scalar> gauges_;
   RunResult result_;
   std::vector<Prepared> prepared_;
-  decant::Origin origin_ = 1000;  // liquid of boxes and inlets; what was filled into body b has origin b
   std::optional<decant::VtkSequence> vtk_;
   double next_vtk_ = 0, next_picture_ = 0;
   std::vector<decant::PictureBody> bodies_;

@@ -425,6 +425,52 @@ elseif(CASE STREQUAL "find_missing_effect_needs_no_picture")
     message(FATAL_ERROR "readings were off by ${before} m and are by ${after} m")
   endif()
 
+elseif(CASE STREQUAL "find_missing_effect_takes_a_scene")
+  # a column collapses and is measured, by a clock that is ahead; that it is so is not told
+  function(write_scene folder spacing)
+    file(WRITE "${SCRATCH}/${folder}/scene.json"
+         "{\"format\": \"decant-scene\", \"version\": 1, \"name\": \"column\", \"spacing_m\": ${spacing}, \"end_s\": 0.5,
+           \"record_hz\": 50, \"liquid\": {\"density\": 1000, \"viscosity\": 0.001, \"surface_tension\": 0},
+           \"bodies\": [{\"name\": \"tank\", \"shape\": {\"box_inside\": {\"min_m\": [0, 0, 0], \"max_m\": [0.3, 0.06, 0.3]},
+                       \"open\": \"+z\"}}],
+           \"fluid\": [{\"box\": {\"min_m\": [0, 0, 0], \"max_m\": [0.12, 0.06, 0.12]}}],
+           \"gauges\": [\"front_mm\", \"level_mm@0.06,0.03\", \"level_mm@0.2,0.03\"]}")
+  endfunction()
+  write_scene(reality 0.01)
+  write_scene(column 0.015)
+  execute_process(COMMAND "${SIMULATE}" reality/scene.json --json reality.json WORKING_DIRECTORY "${SCRATCH}"
+                  RESULT_VARIABLE result ERROR_VARIABLE errors OUTPUT_QUIET)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "simulate failed: ${errors}")
+  endif()
+  execute_process(
+    COMMAND awk "/\\[$/ {name = $1; gsub(/[\":]/, \"\", name); n = 0; next} /\\]/ {name = \"\"}
+                 name != \"\" {value[name, n++] = $1 == \"null,\" ? \"\" : $1 + 0; rows = name == \"t_s\" ? n : rows}
+                 END {print \"t_s,front_mm,level_mm@0.06,0.03,level_mm@0.2,0.03\"
+                      for (k = 0; k < rows; ++k)
+                        print value[\"t_s\", k] + 0.06 \",\" value[\"front_mm\", k] \",\" value[\"level_mm@0.06,0.03\", k] \",\" value[\"level_mm@0.2,0.03\", k]}"
+            reality.json
+    WORKING_DIRECTORY "${SCRATCH}" OUTPUT_FILE column/measurements.csv)
+  run(0 --learn column --frames-per-second 50 --reading-error level_mm=4,front_mm=4 --draws 8 --json out.json)
+  file(READ "${SCRATCH}/out.json" json)
+  string(JSON verdict GET "${json}" verdict)
+  string(JSON effect ERROR_VARIABLE none GET "${json}" effect 0)
+  string(JSON late GET "${json}" strength)
+  string(JSON spacing GET "${json}" spacing_mm)
+  if(NOT verdict STREQUAL named OR NOT effect STREQUAL latency OR late LESS 0.045 OR late GREATER 0.075 OR NOT spacing EQUAL 15)
+    message(FATAL_ERROR "not what is hidden: ${verdict} ${effect} ${late} s, at ${spacing} mm")
+  endif()
+  foreach(sensor RANGE 2)
+    string(JSON before GET "${json}" readings ${sensor} before)
+    string(JSON after GET "${json}" readings ${sensor} after)
+    if(NOT after LESS before)
+      message(FATAL_ERROR "readings of sensor ${sensor} were off by ${before} m and are by ${after} m")
+    endif()
+  endforeach()
+  file(WRITE "${SCRATCH}/column/measurements.csv" "t_s,front_mm\n2,1\n")
+  run(2 --learn column)
+  expect_one_line("${errors}" "measurements.csv: expected times while the scene lasts")
+
 elseif(CASE STREQUAL "find_missing_effect_refuses")
   set(pour "${SOURCE}/examples/data/pour_cup")
   run(2 --json out.json)

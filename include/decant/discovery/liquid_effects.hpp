@@ -384,26 +384,46 @@ InteractionEffect<Model> fill_effect(double most = 1.25) {
       [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.fill = as.strength[0]; });
 }
 
-/// What may be wrong with poses and cameras. @param bodies their names, in the order of the scene's motions.
+/// Poses that were recorded too late.
 template <class Model>
-std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std::string>& bodies) {
+InteractionEffect<Model> latency_effect() {
+  return detail::run_effect<Model>(
+      plain_effect("latency", "", "s", "poses were recorded too late (too early, where negative)",
+                   {"", 0, -0.12, 0.12, 0.008}, ""),
+      EffectKind::Measurement,
+      [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.pose_delay = as.strength[0]; });
+}
+
+/// The same where no body moves, and liquid is let go when the clock starts: a gate takes its time.
+template <class Model>
+InteractionEffect<Model> late_start_effect() {
+  return detail::run_effect<Model>(
+      plain_effect("latency", "", "s", "all begins later than the clock says (earlier, where negative)",
+                   {"", 0, -0.12, 0.12, 0.008}, ""),
+      EffectKind::Measurement,
+      [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.start_delay = as.strength[0]; });
+}
+
+/// A body that is elsewhere. @param body its place among the scene's motions. @param name its name.
+template <class Model>
+InteractionEffect<Model> body_pose_effect(std::size_t body, std::string name) {
+  Effect offset = plain_effect("body_pose", "", "m", "a body is not where its poses say", {"x", 0, -0.02, 0.02, 1.5e-3},
+                               "pose.translation += Eigen::Vector3d(@, @, @);");
+  offset.components.push_back({"y", 0, -0.02, 0.02, 1.5e-3});
+  offset.components.push_back({"z", 0, -0.02, 0.02, 1.5e-3});
+  offset.where = std::move(name);
+  return detail::run_effect<Model>(std::move(offset), EffectKind::Measurement,
+                                   [body](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                     changes.body_offset.at(body) = as.strength.template head<3>();
+                                   });
+}
+
+/// What may be wrong with cameras and masks.
+template <class Model>
+std::vector<InteractionEffect<Model>> camera_effects() {
   using detail::run_effect;
   using Changes = InteractionChanges<Model>;
   std::vector<InteractionEffect<Model>> effects;
-  effects.push_back(run_effect<Model>(
-      plain_effect("latency", "", "s", "poses were recorded too late (too early, where negative)",
-                   {"", 0, -0.12, 0.12, 0.008}, ""),
-      EffectKind::Measurement, [](const AppliedEffect& as, Changes& changes) { changes.pose_delay = as.strength[0]; }));
-  for (std::size_t body = 0; body < bodies.size(); ++body) {
-    Effect offset = plain_effect("body_pose", "", "m", "a body is not where its poses say",
-                                 {"x", 0, -0.02, 0.02, 1.5e-3}, "pose.translation += Eigen::Vector3d(@, @, @);");
-    offset.components.push_back({"y", 0, -0.02, 0.02, 1.5e-3});
-    offset.components.push_back({"z", 0, -0.02, 0.02, 1.5e-3});
-    offset.where = bodies[body];
-    effects.push_back(run_effect<Model>(
-        offset, EffectKind::Measurement,
-        [body](const AppliedEffect& as, Changes& changes) { changes.body_offset.at(body) = as.strength.head<3>(); }));
-  }
   Effect shift =
       plain_effect("camera_shift", "", "px", "the camera has moved, which shifts its picture", {"u", 0, -4, 4, 1}, "");
   shift.components.push_back({"v", 0, -4, 4, 1});
@@ -418,6 +438,19 @@ std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std:
       plain_effect("mask_bias", "", "px", "masks are fatter than the liquid (thinner, where negative)",
                    {"", 0, -2, 2, 0.7}, ""),
       EffectKind::Nuisance, [](const AppliedEffect& as, Changes& changes) { changes.mask_growth = as.strength[0]; }));
+  return effects;
+}
+
+/// What may be wrong with poses and cameras. @param bodies their names, in the order of the scene's motions.
+template <class Model>
+std::vector<InteractionEffect<Model>> measurement_effects(const std::vector<std::string>& bodies) {
+  std::vector<InteractionEffect<Model>> effects{latency_effect<Model>()};
+  for (std::size_t body = 0; body < bodies.size(); ++body) {
+    effects.push_back(body_pose_effect<Model>(body, bodies[body]));
+  }
+  for (InteractionEffect<Model>& effect : camera_effects<Model>()) {
+    effects.push_back(std::move(effect));
+  }
   return effects;
 }
 

@@ -79,6 +79,7 @@ struct InteractionChanges {
   double first = 0;                                     ///< the first frame, from which models run on [s]
   double fill = 1;                                      ///< over what the model assumes
   double pose_delay = 0;                                ///< poses were recorded so late [s]
+  double start_delay = 0;                               ///< all happens so much later than the clock says [s]
   std::vector<Vector3<double>> body_offset{};           ///< by body: where it is off its recorded pose [m], world frame
   Eigen::Vector2d camera_shift{0, 0};                   ///< of the picture [px]
   double camera_roll = 0;                               ///< of the picture about its middle, clockwise [rad]
@@ -285,7 +286,7 @@ class SimulatedInteraction {
     }
     std::vector<Mask> masks(eyes.size());
     std::vector<double> first_read(scene_.sensors.size()), read(scene_.sensors.size());
-    const double start = model.time() - scene_.times.front();
+    const double start = model.time() - scene_.times.front() - changes.start_delay;
     for (std::size_t frame = 0; frame < scene_.times.size(); ++frame) {
       const double until = start + scene_.times[frame];
       while (model.time() < until - 1e-9) {
