@@ -162,10 +162,7 @@ class SceneRun {
 
   // Which way is up in a body that stands as it does now.
   decant::Vector3<double> up_in(std::size_t body) const {
-    const decant::Vector3<double> up = scene_.gravity.norm() > 0
-                                           ? decant::Vector3<double>(-scene_.gravity.normalized())
-                                           : decant::Vector3<double>(decant::Vector3<double>::UnitZ());
-    return pose_of(body).rotation.conjugate() * up;
+    return pose_of(body).rotation.conjugate() * up_of(scene_.gravity);
   }
 
   void prepare_gauges() {
@@ -302,9 +299,8 @@ class SceneRun {
       return;
     }
     // from the front, a little from the right and from above
-    const decant::Vector3<double> up = scene_.gravity.norm() > 0 && !follow
-                                           ? decant::Vector3<double>(-scene_.gravity.normalized())
-                                           : decant::Vector3<double>(decant::Vector3<double>::UnitZ());
+    const decant::Vector3<double> up =
+        follow ? decant::Vector3<double>(decant::Vector3<double>::UnitZ()) : up_of(scene_.gravity);
     const decant::Vector3<double> across = std::abs(up.x()) < 0.9
                                                ? decant::Vector3<double>(decant::Vector3<double>::UnitX())
                                                : decant::Vector3<double>(decant::Vector3<double>::UnitY());

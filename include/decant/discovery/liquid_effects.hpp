@@ -384,24 +384,29 @@ InteractionEffect<Model> fill_effect(double most = 1.25) {
       [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.fill = as.strength[0]; });
 }
 
+namespace detail {
+
+template <class Model>
+InteractionEffect<Model> delay_effect(std::string meaning, double InteractionChanges<Model>::*delay) {
+  return run_effect<Model>(
+      plain_effect("latency", "", "s", std::move(meaning), {"", 0, -0.12, 0.12, 0.008}, ""), EffectKind::Measurement,
+      [delay](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.*delay = as.strength[0]; });
+}
+
+}  // namespace detail
+
 /// Poses that were recorded too late.
 template <class Model>
 InteractionEffect<Model> latency_effect() {
-  return detail::run_effect<Model>(
-      plain_effect("latency", "", "s", "poses were recorded too late (too early, where negative)",
-                   {"", 0, -0.12, 0.12, 0.008}, ""),
-      EffectKind::Measurement,
-      [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.pose_delay = as.strength[0]; });
+  return detail::delay_effect<Model>("poses were recorded too late (too early, where negative)",
+                                     &InteractionChanges<Model>::pose_delay);
 }
 
 /// The same where no body moves, and liquid is let go when the clock starts: a gate takes its time.
 template <class Model>
 InteractionEffect<Model> late_start_effect() {
-  return detail::run_effect<Model>(
-      plain_effect("latency", "", "s", "all begins later than the clock says (earlier, where negative)",
-                   {"", 0, -0.12, 0.12, 0.008}, ""),
-      EffectKind::Measurement,
-      [](const AppliedEffect& as, InteractionChanges<Model>& changes) { changes.start_delay = as.strength[0]; });
+  return detail::delay_effect<Model>("all begins later than the clock says (earlier, where negative)",
+                                     &InteractionChanges<Model>::start_delay);
 }
 
 /// A body that is elsewhere. @param body its place among the scene's motions. @param name its name.
