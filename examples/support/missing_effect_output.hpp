@@ -63,7 +63,8 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
                          {"strength", components_json(found.strength)},
                          {"unit", effect.unit},
                          {"share", number_json(found.share)},
-                         {"distance", number_json(found.distance)}};
+                         {"distance", number_json(found.distance)},
+                         {"probability", number_json(found.probability)}};
   for (std::size_t k = 0; k < effect.components.size(); ++k) {
     const auto [low, high] = found.interval_90(k);
     json["interval_90"].push_back({number_json(low), number_json(high)});
@@ -163,7 +164,11 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   }
   text += ": with it the gap falls by ";
   text += decant::detail::fixed_text(100 * result.learn.share(), 0);
-  return text + " % of what is reducible.";
+  text += " % of what is reducible.";
+  if (result.told_apart_by_others) {
+    text += " What was learnt from does not tell it from others; the recordings held out do.";
+  }
+  return text;
 }
 
 /// What the answer owes to references.
@@ -261,6 +266,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                       : result.confirmation == Confirmation::Refuted     ? nlohmann::json(false)
                       : result.confirmation == Confirmation::NotTestable ? nlohmann::json("not_testable")
                                                                          : nlohmann::json();
+  json["told_apart_by_held_out"] = result.told_apart_by_others;
   json["taught_by"] = result.taught_by;
   json["runs"] = result.runs;
   return json;
@@ -270,7 +276,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
 inline decant::Table candidates_table(const std::vector<decant::Effect>& effects, const decant::MissingEffect& result) {
   using decant::detail::fixed_text;
   decant::Table table({"effect", "unit", "strength", "gap left", "of what is reducible [%]", "vote", "refined",
-                       "gap left then", "of what is reducible then [%]"});
+                       "gap left then", "of what is reducible then [%]", "probability"});
   for (const decant::EffectStanding& each : result.judgement.standings) {
     const decant::Effect& effect = effects.at(each.effect);
     std::vector<std::string> row{effect.words(),
@@ -285,6 +291,7 @@ inline decant::Table candidates_table(const std::vector<decant::Effect>& effects
     row.push_back(is ? detail::components_text(refined->strength) : "");
     row.push_back(is ? fixed_text(refined->distance, 2) : "");
     row.push_back(is ? fixed_text(100 * refined->share, 0) : "");
+    row.push_back(is ? fixed_text(refined->probability, 3) : "");
     table.add(row);
   }
   return table;

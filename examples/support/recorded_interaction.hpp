@@ -237,10 +237,13 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
           obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + body.name));
       // where liquid is while it is poured: holes of other heights let out jets that do not overlap
       const double wall = inside->up.dot(places.lip - inside->floor);
+      const BoundingVolumeHierarchy surface(body.mesh);
       for (const auto& [where, share] : std::initializer_list<std::pair<const char*, double>>{
                {"foot of the wall of the ", 0.2}, {"wall of the ", 0.5}, {"wall below the rim of the ", 0.8}}) {
-        const Vector3<double> on_wall = places.lip - (1 - share) * wall * inside->up;
-        of_bodies.push_back(leak_effect<EffectModel>(id, on_wall + 0.004 * in, -0.014 * in, where + body.name));
+        const Vector3<double> lower = (1 - share) * wall * inside->up;
+        const WallPlace place = wall_place(surface, inside->mouth() - lower, places.lip - lower);
+        of_bodies.push_back(leak_effect<EffectModel>(id, place.point - 0.004 * place.out,
+                                                     (place.thickness + 0.013) * place.out, where + body.name));
       }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(

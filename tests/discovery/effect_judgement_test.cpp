@@ -57,6 +57,43 @@ ChanceLevel usual_chance() {
 
 }  // namespace
 
+TEST_CASE("effect judgement: what chance takes away once in fifty times is as likely as that says") {
+  ChanceLevel chance;
+  chance.distance = 1.5;
+  chance.fall = 0.1;
+  const auto value = [&](double distance) { return evidence_of(distance, 0, chance).value; };
+  for (const double left : {1.5, 3.0, 20.0}) {  // whatever the scale of what is left
+    CHECK(value(left) - value(1.1 * left) == Approx(0.5 * 5.41));
+    // a deviation is what evidence is off by if the distance is
+    const double slope = (value(left) - value(1.0001 * left)) / (0.0001 * left);
+    CHECK(evidence_of(left, 0.2, chance).deviation == Approx(0.2 * slope).epsilon(1e-3));
+  }
+  CHECK(value(0) == value(0.015));  // to be nearer to nothing is no proof without end
+  chance.fall = 0;
+  CHECK(std::isfinite(value(0)));
+}
+
+TEST_CASE("effect judgement: probabilities are of what evidence says, and the less sure the fewer runs say it") {
+  const std::vector<double> sure = probabilities({{-3, 0}, {-3 + std::log(4), 0}, {-800, 0}});
+  CHECK(sure[0] == Approx(0.2));
+  CHECK(sure[1] == Approx(0.8));
+  CHECK(sure[2] == Approx(0).margin(1e-12));
+  // the mean of a logistic function over a normal distribution of deviation 2, by quadrature
+  const double deviation = 2, apart = 2;
+  double mean = 0;
+  for (int k = -800; k <= 800; ++k) {
+    const double z = 0.01 * k;
+    mean += 0.01 / std::sqrt(2 * std::acos(-1)) * std::exp(-0.5 * z * z) / (1 + std::exp(-(apart + deviation * z)));
+  }
+  std::vector<Evidence> two(2);
+  two[0].value = apart;
+  for (Evidence& unsure : two) {  // whichever it is
+    unsure.deviation = deviation;
+    CHECK(probabilities(two)[0] == Approx(mean).margin(0.01));
+    unsure.deviation = 0;
+  }
+}
+
 TEST_CASE("effect dictionary: runs to both sides of each component, templates for what is not named") {
   std::vector<Effect> effects{named("one"), named("two"), named("seen"), named("sure")};
   effects[0].components = {{"", 2, 2, 4}};  // to one side alone

@@ -37,6 +37,31 @@ std::string name_of(const MissingEffect& result) {
   return result.found.empty() ? "" : model.effects()[result.found.front().effect].name;
 }
 
+/// Knows of what pulls, and of what does the same in one interaction and the opposite in another.
+class TwoPulls {
+ public:
+  TwoPulls(double angle, double sign) : jet_(angle), effects_(jet_.effects()), sign_(sign) {
+    effects_.push_back(effects_[pull]);
+    effects_.back().name = "turncoat";
+    effects_.back().components[0].tolerance = 0;
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(ModelRun run) const {
+    for (AppliedEffect& each : run.effects) {
+      if (each.effect == effects_.size() - 1) {
+        each = {pull, sign_ * each.strength};
+      }
+    }
+    return jet_.predict(run);
+  }
+
+ private:
+  static constexpr std::size_t pull = 1;
+  JetModel jet_;
+  std::vector<Effect> effects_;
+  double sign_;
+};
+
 }  // namespace
 
 TEST_CASE("missing effect: each is named with its strength, and confirmed where it was not looked at") {
@@ -66,33 +91,69 @@ TEST_CASE("missing effect: each is named with its strength, and confirmed where 
 }
 
 TEST_CASE("missing effect: what explains no more than chance is no alternative, however near the best one it counts") {
-  MissingEffectSettings settings;
-  settings.alike_factor = 1e6;  // all that were looked at are near
-  const MissingEffect result = found_in({0, 0, 1, 0.05}, 31, settings);
-  std::size_t by_chance = 0;
+  const MissingEffect result = found_in({0, 0, 1, 0.03}, 31);  // so weak that nothing is sure
+  REQUIRE(result.refined.size() == 3);
+  CHECK(result.refined.front().probability < 0.95);
+  double sum = 0;
   for (const RefinedEffect& each : result.refined) {
-    const bool alternative = std::count(result.one_of.begin(), result.one_of.end(), each.effect) > 0;
-    const bool explains = relative_fall(result.learn.before, each.distance) > result.learn.by_chance;
-    by_chance += explains ? 0 : 1;
-    CHECK((explains || !alternative));
+    sum += each.probability;
   }
-  CHECK(by_chance >= 1);
-  CHECK(!result.one_of.empty());
+  CHECK(sum == Approx(1));
+  for (std::size_t k = 1; k < 3; ++k) {
+    CHECK(relative_fall(result.learn.before, result.refined[k].distance) < result.learn.by_chance);
+  }
+  CHECK(result.verdict == Verdict::Named);
+  CHECK(result.one_of.empty());
+  CHECK(name_of(result) == "late");
 }
 
 TEST_CASE("missing effect: what a pour does not tell apart is told as a set") {
   // a weak pull against the jet looks like drag, up to what chance decides
   int sets = 0;
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
   for (const std::uint32_t seed : {31U, 34U, 37U, 40U}) {
-    const MissingEffect result = found_in({0, -0.7}, seed);
-    REQUIRE((result.verdict == Verdict::OneOf || result.verdict == Verdict::Named));
-    if (result.verdict == Verdict::OneOf) {
+    const MissingEffect alone =
+        MissingEffectSearch<JetModel>({{"a", &model, film_of({0, -0.7}, seed, 0.9)}}, {}, run_jobs_on(executor)).find();
+    REQUIRE((alone.verdict == Verdict::OneOf || alone.verdict == Verdict::Named));
+    if (alone.verdict == Verdict::OneOf) {
       ++sets;
-      CHECK(std::count(result.one_of.begin(), result.one_of.end(), 0U) == 1);
-      CHECK(std::count(result.one_of.begin(), result.one_of.end(), 1U) == 1);
+      CHECK(std::count(alone.one_of.begin(), alone.one_of.end(), 0U) == 1);
+      CHECK(std::count(alone.one_of.begin(), alone.one_of.end(), 1U) == 1);
     }
+    const MissingEffect checked = found_in({0, -0.7}, seed);
+    CHECK((checked.verdict == Verdict::OneOf || name_of(checked) == "pull"));
   }
   CHECK(sets >= 1);
+}
+
+TEST_CASE("missing effect: what recordings learnt from do not tell apart, others may") {
+  const TwoPulls model(0.9, 1), other(0.6, -1);
+  ThreadExecutor executor{{1}};
+  const auto find = [&](double held_out_pull, std::uint32_t seed) {
+    return MissingEffectSearch<TwoPulls>({{"a", &model, film_of({0, 0.9}, seed, 0.9)}},
+                                         {{"b", &other, film_of({0, held_out_pull}, seed + 1, 0.6)}},
+                                         run_jobs_on(executor))
+        .find();
+  };
+  for (const std::uint32_t seed : {31U, 34U, 37U}) {  // whichever is better by chance
+    for (const auto& [held_out_pull, answer] :
+         std::vector<std::pair<double, std::string>>{{0.9, "pull"}, {-0.9, "turncoat"}}) {
+      const MissingEffect result = find(held_out_pull, seed);
+      CHECK(result.verdict == Verdict::Named);
+      CHECK(result.told_apart_by_others);
+      CHECK(result.one_of.empty());
+      REQUIRE(result.found.size() == 1);
+      CHECK(model.effects()[result.found.front().effect].name == answer);
+      CHECK(result.learn.after == result.found.front().distance);
+      CHECK(result.confirmation == Confirmation::Confirmed);
+      CHECK(result.held_out.best_rival > result.held_out.before);  // the other one makes it worse
+    }
+    const MissingEffect undecided = find(0, seed);  // where neither is seen
+    CHECK(undecided.verdict == Verdict::OneOf);
+    CHECK(undecided.one_of.size() == 2);
+    CHECK_FALSE(undecided.told_apart_by_others);
+  }
 }
 
 TEST_CASE("missing effect: nothing where nothing is, also where all is off within its tolerance") {
@@ -260,16 +321,28 @@ TEST_CASE("missing effect: what is left does not depend on how many runs say so"
   for (std::uint32_t seed = 1; seed <= 24; ++seed) {
     runs.emplace_back(&of.front(), ModelRun{{}, 300 + seed, false});
   }
-  const std::vector<double> one_by_one = distances_left(make, runs, 1, known.recorded);
-  const std::vector<double> together = distances_left(make, runs, 24, known.recorded);
+  const std::vector<DistanceLeft> one_by_one = distances_left(make, runs, 1, known.recorded);
+  const std::vector<DistanceLeft> together = distances_left(make, runs, 24, known.recorded);
   REQUIRE(one_by_one.size() == 24);
   REQUIRE(together.size() == 1);
   double mean = 0;
-  for (const double each : one_by_one) {
-    mean += each / 24;
+  for (const DistanceLeft& each : one_by_one) {
+    mean += each.value / 24;
   }
   // single runs are off by their own chaos, too, which two samples of 24 know within a third
-  CHECK(mean == Approx(together.front()).margin(known.recorded.front().chaos() / 3));
+  CHECK(mean == Approx(together.front().value).margin(known.recorded.front().chaos() / 3));
+  // what few runs say of how far they are off is how far eight of such are apart, up to what so few know of that
+  const std::vector<DistanceLeft> by_three = distances_left(make, runs, 3, known.recorded);
+  REQUIRE(by_three.size() == 8);
+  double sum = 0, squares = 0, said = 0;
+  for (const DistanceLeft& each : by_three) {
+    sum += each.value;
+    squares += each.value * each.value;
+    said += each.deviation * each.deviation / 8;
+  }
+  const double seen = (squares - sum * sum / 8) / 7;
+  CHECK(std::sqrt(said) > 0.5 * std::sqrt(seen));
+  CHECK(std::sqrt(said) < 2 * std::sqrt(seen));
 }
 
 TEST_CASE("missing effect: two at once are found one after another") {
@@ -290,20 +363,44 @@ TEST_CASE("missing effect: two at once are found one after another") {
   CHECK(result.confirmation == Confirmation::Confirmed);
 }
 
+TEST_CASE("missing effect: a second one that does not help where it was not learnt from is none") {
+  const JetModel model(0.9), other(0.6);
+  ThreadExecutor executor{{1}};
+  const Jet pulled_late{0, 0.8, 1, 0.05}, pulled{0, 0.8};
+  const auto found = [&](const Jet& held_out) {
+    return MissingEffectSearch<JetModel>({{"a", &model, film_of(pulled_late, 72, 0.9)}},
+                                         {{"b", &other, film_of(held_out, 73, 0.6)}}, run_jobs_on(executor))
+        .find();
+  };
+  CHECK(found(pulled_late).found.size() == 2);
+  const MissingEffect result = found(pulled);
+  CHECK(result.verdict == Verdict::Named);
+  REQUIRE(result.found.size() == 1);
+  CHECK(model.effects()[result.found.front().effect].name == "pull");
+  CHECK(result.learn.after == result.refined.front().distance);
+}
+
 TEST_CASE("missing effect: the more effects, the less they may leave, and one that helps little is the last") {
   const Jet gust{0, 0, 1, 0, 4};  // which no effect is, but a pull at another speed looks like it
-  const MissingEffect usual = found_in(gust, 71);
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
+  // no others are held out, in which a second effect would not help
+  const auto found_alone = [&](const MissingEffectSettings& settings = {}) {
+    return MissingEffectSearch<JetModel>({{"a", &model, film_of(gust, 71, 0.9)}}, {}, run_jobs_on(executor), settings)
+        .find();
+  };
+  const MissingEffect usual = found_alone();
   CHECK(usual.verdict == Verdict::Unexplained);
   MissingEffectSettings settings;
   settings.least_share = 0.5;  // so two may leave a quarter
   settings.most_left = 100;    // a gust is far more than what chance does
-  const MissingEffect two = found_in(gust, 71, settings);
+  const MissingEffect two = found_alone(settings);
   CHECK(two.verdict == Verdict::Named);
   REQUIRE(two.found.size() == 2);
   CHECK(two.found.back().share > MissingEffectSettings{}.least_share);  // enough for one
 
   settings.promising_factor = 2 * two.refined.front().share + 0.01;  // half of it is asked of one
-  const MissingEffect one = found_in(gust, 71, settings);
+  const MissingEffect one = found_alone(settings);
   CHECK(one.verdict == Verdict::Unexplained);
   CHECK(one.runs < two.runs);
 }
@@ -370,6 +467,6 @@ TEST_CASE("missing effect: what is asked is checked") {
   settings.enough_share = -1;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("enough_share"));
   settings = {};
-  settings.alike_factor = 0.5;
-  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("alike_factor"));
+  settings.sure = 1.5;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("sure"));
 }

@@ -303,7 +303,7 @@ TEST_CASE("readings: cameras and a scale together tell what either does not") {
   };
   CHECK(found({}, 1) == "");
   CHECK(found({}, 1.15) == "density");
-  CHECK(found({0.5}, 1) == "drag");
+  CHECK(found({0.8}, 1) == "drag");  // half as much could be a pull
   CHECK(found({0, 0, 1.06}, 1) == "speed");
 }
 

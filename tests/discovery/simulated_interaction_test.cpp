@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -311,6 +312,47 @@ TEST_CASE("simulated interaction: what acts for a while acts then, on the record
   const std::vector<std::size_t> wet = frames_that_differ(run_with(pour, "inflow", {40}, "later"));
   REQUIRE(!wet.empty());
   CHECK(wet.front() == 4);
+}
+
+TEST_CASE("simulated interaction: liquid has come to rest under what pulls it all the time and not under a gust") {
+  const double radius = 0.04, depth = 0.04, pull = 1;
+  Pour::Scene scene;
+  scene.motion = {PoseTrack(Pose{})};
+  scene.times = {0, 0.5};
+  scene.start = [&](SimulatorSettings settings, double fill) {
+    settings.threads = {1};
+    PourModel model(settings);
+    const BodyId glass = model.add_body("glass", CylinderInside{radius, 3 * depth, 0.003, Face::PositiveZ});
+    decant::fill(model, glass, FillAmount::volume(fill * std::numbers::pi * radius * radius * depth));
+    return model;
+  };
+  auto effects = force_effects<PourModel>(1e-6);
+  effects.push_back(passing_force_effect<PourModel>({0, 10}, 0.1, "from the beginning"));
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.006;
+  const Pour still(scene, effects, settings);
+  const auto aside = [](PourModel& model) {
+    return static_cast<double>(model.fluid().position.row(0).template cast<double>().mean());
+  };
+  const double analytic = 0.25 * radius * radius / depth * pull / 9.81;  // the middle of a cylinder's oblique end
+  PourModel plain = still.started({{}, 1, false});
+  PourModel leaning = still.started(run_with(still, "lateral_force", {pull, 0}, ""));
+  const double from = aside(plain), rest = aside(leaning) - from;
+  CHECK(rest == Approx(analytic).epsilon(0.12));
+  PourModel gust = still.started(run_with(still, "lateral_force", {pull, 0}, "from the beginning"));
+  CHECK(aside(gust) == from);
+  // one stays as it is, the other sloshes to twice as far
+  double farthest = 0, nearest = 1, thrown = 0;
+  for (int k = 0; k < 30; ++k) {
+    REQUIRE(leaning.step(0.01).advanced());
+    REQUIRE(gust.step(0.01).advanced());
+    farthest = std::max(farthest, aside(leaning) - from);
+    nearest = std::min(nearest, aside(leaning) - from);
+    thrown = std::max(thrown, aside(gust) - from);
+  }
+  CHECK(nearest > 0.85 * rest);
+  CHECK(farthest < 1.15 * rest);
+  CHECK(thrown > 1.5 * rest);
 }
 
 TEST_CASE("simulated interaction: obstacles go with their body, and necks hold liquid back") {

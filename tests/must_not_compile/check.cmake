@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Compiles SOURCE, which must fail and say its `// expect:` sentences, and its twin, which must compile.
+# Compiles SOURCE, which must fail and say its `// expect:` sentences.
 cmake_minimum_required(VERSION 3.22)
 
 file(STRINGS "${SOURCE}" expectations REGEX "^// expect: ")
@@ -14,10 +14,6 @@ if(COMPILER_ID STREQUAL GNU)
   list(APPEND flags -fconcepts-diagnostics-depth=3)
 endif()
 
-execute_process(COMMAND "${COMPILER}" ${flags} -DDECANT_TWIN "${SOURCE}" RESULT_VARIABLE result ERROR_VARIABLE output)
-if(NOT result EQUAL 0)
-  message(FATAL_ERROR "the twin does not compile either:\n${output}")
-endif()
 execute_process(COMMAND "${COMPILER}" ${flags} "${SOURCE}" RESULT_VARIABLE result ERROR_VARIABLE output)
 if(result EQUAL 0)
   message(FATAL_ERROR "compiles, but must not")

@@ -4,6 +4,7 @@
 /// Recordings beside dictionaries of runs: what they say of each effect, and what chance says.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -37,30 +38,59 @@ struct ComparedRecordings {
   ChanceLevel chance{};
 };
 
-/// What is left of recordings with the mean of some runs in place of the model as it is: mean distances, set after set.
-/// What few runs' mean is off by through their own chaos is taken off, as that of many is not. Infinite where a run
-/// failed.
+/// What is left of recordings.
+struct DistanceLeft {
+  double value = 0;      ///< in the mean
+  double deviation = 0;  ///< standard, of the few runs; by leaving out one of them at a time
+};
+
+namespace detail {
+
+/// With the mean of some runs, of which one may be left out, in place of the model as it is. What few runs' mean is off
+/// by through their own chaos is taken off, as that of many is not. Infinite where a run failed.
+inline double distance_left(const RecordedEvidence& of, std::vector<Observation> runs,
+                            std::optional<std::size_t> without = {}) {
+  if (without) {
+    runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(*without));
+  }
+  const auto middle = of.mean_features(runs);
+  if (!middle) {
+    return std::numeric_limits<double>::infinity();
+  }
+  const double distance = of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
+  return std::max(0.0, distance - of.chaos() / static_cast<double>(runs.size()));
+}
+
+}  // namespace detail
+
+/// What is left with the mean of some runs in place of the model as it is, set after set; infinite where a run failed.
 /// @param runs `seeds` of them for each recording in turn, set after set.
 template <ForwardModel Model>
-std::vector<double> distances_left(InteractionRuns<Model>& make,
-                                   const std::vector<typename InteractionRuns<Model>::Run>& runs, std::size_t seeds,
-                                   const std::vector<RecordedEvidence>& recorded) {
+std::vector<DistanceLeft> distances_left(InteractionRuns<Model>& make,
+                                         const std::vector<typename InteractionRuns<Model>::Run>& runs,
+                                         std::size_t seeds, const std::vector<RecordedEvidence>& recorded) {
   const std::vector<Observation> seen = make(runs);
-  std::vector<double> result;
-  for (const auto* next = seen.data(); next < seen.data() + seen.size();) {
-    double sum = 0;
+  std::vector<DistanceLeft> result;
+  const auto count = static_cast<double>(recorded.size());
+  for (auto next = seen.begin(); next < seen.end();) {
+    DistanceLeft left;
+    double variance = 0;
     for (const RecordedEvidence& of : recorded) {
-      const auto middle = of.mean_features({next, seeds});
-      next += seeds;
-      if (middle) {
-        const double distance =
-            of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
-        sum += std::max(0.0, distance - of.chaos() / static_cast<double>(seeds));
-      } else {
-        sum = std::numeric_limits<double>::infinity();
+      const std::vector<Observation> own(next, next + static_cast<std::ptrdiff_t>(seeds));
+      next += static_cast<std::ptrdiff_t>(seeds);
+      left.value += detail::distance_left(of, own) / count;
+      // the jackknife (Efron and Tibshirani, An Introduction to the Bootstrap, 1993)
+      double sum = 0, squares = 0;
+      for (std::size_t k = 0; seeds > 1 && k < seeds; ++k) {
+        const double one = detail::distance_left(of, own, k);
+        sum += one;
+        squares += one * one;
       }
+      const auto runs_of = static_cast<double>(seeds);
+      variance += std::max(0.0, squares - sum * sum / runs_of) * (runs_of - 1) / runs_of / (count * count);
     }
-    result.push_back(sum / static_cast<double>(recorded.size()));
+    left.deviation = std::isfinite(left.value) ? std::sqrt(variance) : 0;
+    result.push_back(left);
   }
   return result;
 }

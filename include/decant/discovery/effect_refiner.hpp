@@ -35,6 +35,9 @@ namespace decant::inline DECANT_TARGET {
 struct RefinedTogether {
   std::vector<RefinedEffect> effects{};  ///< the new one last
   double distance = 0, share = 0;        ///< see RefinedEffect
+  /// Of what is left, less one for each number that was fitted: so much they take away by chance (Akaike, IEEE Trans.
+  /// Autom. Control 19, 1974).
+  Evidence evidence{};
 };
 
 /// Refines the best effects of a judgement.
@@ -46,31 +49,11 @@ class EffectRefiner {
                 const std::vector<Interaction<Model>>& of)
       : runs_(&runs), settings_(settings), of_(&of) {}
 
-  /// The best of different answers, each refined together with what was found before; the best first.
+  /// The best of different answers, each refined together with what was found before; by evidence, the best first.
   /// @param before the distance to the model without any.
   std::vector<RefinedTogether> best(const Judgement& judgement, const ComparedRecordings& known,
                                     const std::vector<RefinedEffect>& found, double before) {
-    std::vector<Candidate> candidates;
-    std::map<std::string, int> instances;
-    for (const EffectStanding& standing : judgement.standings) {
-      const Effect& effect = known.effects[standing.effect];
-      const std::size_t number = known.number[standing.effect];
-      const bool is_found =
-          std::any_of(found.begin(), found.end(), [&](const RefinedEffect& other) { return other.effect == number; });
-      // of one family the best one, and of an effect in several places two of them
-      const int most = effect.place ? 2 : 1;
-      if (candidates.size() < static_cast<std::size_t>(settings_.refined) && !is_found && standing.improvement > 0 &&
-          instances[effect.answer()] < most) {
-        ++instances[effect.answer()];
-        candidates.emplace_back().judged = standing.effect;
-        EffectPoint& point = candidates.back().point;
-        for (const RefinedEffect& each : found) {
-          point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
-        }
-        point.add(effect, number, {number, standing.strength, {}});
-        point = point.rounded();
-      }
-    }
+    std::vector<Candidate> candidates = chosen(judgement, known, found);
     const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
     for (int round = 0; round < most && !candidates.empty(); ++round) {
       if (round >= settings_.refinement_rounds) {
@@ -86,20 +69,28 @@ class EffectRefiner {
     for (const Candidate& each : candidates) {
       points.push_back(each.point);
     }
-    const std::vector<double> distance = distances(points, known);
-    const auto nearest =
-        static_cast<std::size_t>(std::min_element(distance.begin(), distance.end()) - distance.begin());
+    const std::vector<DistanceLeft> left = distances(points, known);
+    std::vector<Evidence> evidence;
+    double least = std::numeric_limits<double>::infinity();
+    std::size_t best = 0;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      evidence.push_back(evidence_of(left[k].value, left[k].deviation, known.chance));
+      evidence.back().value -= static_cast<double>(points[k].size());
+      least = std::min(least, left[k].value);
+      best = evidence[k].value > evidence[best].value ? k : best;
+    }
     std::vector<RefinedTogether> refined;
     for (std::size_t k = 0; k < points.size(); ++k) {
-      if (!std::isfinite(distance[k])) {
+      if (!std::isfinite(left[k].value)) {
         continue;
       }
       RefinedTogether one;
-      one.distance = distance[k];
-      one.share = share_of_reducible(before, one.distance, known.chance.distance, distance[nearest]);
+      one.distance = left[k].value;
+      one.evidence = evidence[k];
+      one.share = share_of_reducible(before, one.distance, known.chance.distance, least);
       const Eigen::VectorXd deviation =
-          k == nearest ? deviations(points[k], candidates[k].views, known)
-                       : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
+          k == best ? deviations(points[k], candidates[k].views, known)
+                    : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);
         const auto [begin, count] = points[k].strength_of(part);
@@ -110,7 +101,7 @@ class EffectRefiner {
       refined.push_back(std::move(one));
     }
     std::stable_sort(refined.begin(), refined.end(),
-                     [](const auto& a, const auto& b) { return a.distance < b.distance; });
+                     [](const auto& a, const auto& b) { return a.evidence.value > b.evidence.value; });
     return refined;
   }
 
@@ -132,6 +123,56 @@ class EffectRefiner {
     double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
     bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
   };
+
+  /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places two of
+  /// them, by evidence. What lasts for a while explains more by chance than what lasts.
+  std::vector<Candidate> chosen(const Judgement& judgement, const ComparedRecordings& known,
+                                const std::vector<RefinedEffect>& found) const {
+    struct Instance {
+      Candidate candidate;
+      double evidence;
+    };
+    std::map<std::string, std::vector<Instance>> of_answer;
+    std::vector<std::string> order;  // of answers, by vote, as often as each has an effect
+    for (const EffectStanding& standing : judgement.standings) {
+      const Effect& effect = known.effects[standing.effect];
+      const std::size_t number = known.number[standing.effect];
+      const bool is_found =
+          std::any_of(found.begin(), found.end(), [&](const RefinedEffect& other) { return other.effect == number; });
+      if (is_found || !(standing.improvement > 0)) {
+        continue;
+      }
+      Candidate candidate;
+      candidate.judged = standing.effect;
+      for (const RefinedEffect& each : found) {
+        candidate.point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
+      }
+      candidate.point.add(effect, number, {number, standing.strength, {}});
+      candidate.point = candidate.point.rounded();
+      const double evidence =
+          evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(candidate.point.size());
+      of_answer[effect.answer()].push_back({std::move(candidate), evidence});
+      order.push_back(effect.answer());
+    }
+    std::map<std::string, std::size_t> taken;
+    std::vector<Candidate> result;
+    for (auto& [answer, instances] : of_answer) {
+      std::stable_sort(instances.begin(), instances.end(),
+                       [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
+    }
+    for (const std::string& answer : order) {
+      std::vector<Instance>& instances = of_answer[answer];
+      const std::size_t next = taken[answer];
+      if (result.size() == static_cast<std::size_t>(settings_.refined) || next == instances.size()) {
+        continue;
+      }
+      if (next < (known.effects[instances[next].candidate.judged].place ? 2U : 1U)) {
+        result.push_back(std::move(instances[next].candidate));
+        ++taken[answer];
+      }
+    }
+    return result;
+  }
 
   /// Leaves the best one, the next best one as its rival, and all others that may come near it.
   static void keep_promising(std::vector<Candidate>& candidates, const ChanceLevel& chance) {
@@ -317,14 +358,16 @@ class EffectRefiner {
     return square.cwiseSqrt();
   }
 
-  /// What is left of the learnt recordings at each point, by runs of their own seeds; infinite where runs fail.
-  std::vector<double> distances(const std::vector<EffectPoint>& points, const ComparedRecordings& known) {
+  /// What is left of the learnt recordings at each point; infinite where runs fail. All points have the same seeds:
+  /// what chaos does to all alike tells nothing of them.
+  std::vector<DistanceLeft> distances(const std::vector<EffectPoint>& points, const ComparedRecordings& known) {
     const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
     std::vector<Run> runs;
     for (const EffectPoint& point : points) {
+      std::uint32_t seed = 9001;
       for (const Interaction<Model>& of : *of_) {
         for (std::size_t k = 0; k < seeds; ++k) {
-          runs.emplace_back(&of, point.run(9001 + static_cast<std::uint32_t>(runs.size())));
+          runs.emplace_back(&of, point.run(seed++));
         }
       }
     }

@@ -66,14 +66,21 @@ TimeWindow in_model_time(const TimeWindow& window, const Model& model, double fi
   return {model.time() + window.from - first_frame, model.time() + window.until - first_frame};
 }
 
+/// Since when a force acts.
+enum class ForceBegins {
+  WithRecording,  ///< or later: liquid at rest is not moved by it, or it was not there before
+  BeforeIt        ///< liquid has come to rest under it, unless it acts for a while only: a leaning table
+};
+
 /// What may be missing from a force's own numbers: set(force, strength) changes the force before a run begins, or
 /// set(force, as), with all that is asked for; windows are then in the model's own time.
 template <class Force, class Model, class Set>
-InteractionEffect<Model> force_effect(Effect effect, Set set) {
+InteractionEffect<Model> force_effect(Effect effect, Set set, ForceBegins begins = ForceBegins::WithRecording) {
   InteractionEffect<Model> result;
   static_cast<Effect&>(result) = std::move(effect);
-  result.apply = [set](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-    changes.of_model.push_back([=, first = changes.first](Model& model) {
+  result.apply = [set, begins](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+    const bool before = begins == ForceBegins::BeforeIt && !as.window;
+    (before ? changes.before_settling : changes.of_model).push_back([=, first = changes.first](Model& model) {
       Force& force = model.template force<Force>();
       if constexpr (std::is_invocable_v<Set, Force&, const AppliedEffect&>) {
         AppliedEffect own = as;
@@ -167,7 +174,7 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
   effects.push_back(force_effect<SurfaceTension<Scalar>, Model>(
       plain_effect("surface_tension", "", "N/m", "the liquid's surface holds together more than assumed",
                    {"", 0, 0, 0.3, 0.02}, "simulator.force<SurfaceTension<float>>().surface_tension = @;"),
-      [](auto& force, double s) { force.surface_tension = static_cast<Scalar>(s); }));
+      [](auto& force, double s) { force.surface_tension = static_cast<Scalar>(s); }, ForceBegins::BeforeIt));
   effects.push_back(force_effect<WallFriction<Scalar>, Model>(
       plain_effect("wall_friction", "", "1/s", "walls slow the liquid that touches them", {"", 0, 0, 60, 1},
                    "simulator.force<WallFriction<float>>().rate = @;"),
@@ -175,14 +182,15 @@ std::vector<InteractionEffect<Model>> force_effects(double kinematic_viscosity,
   effects.push_back(force_effect<WallAdhesion<Scalar>, Model>(
       plain_effect("wall_adhesion", "", "m/s^2", "walls attract the liquid, which runs down the outside of a spout",
                    {"", 0, 0, 30, 1}, "simulator.force<WallAdhesion<float>>().strength = @;"),
-      [](auto& force, double s) { force.strength = static_cast<Scalar>(s); }));
+      [](auto& force, double s) { force.strength = static_cast<Scalar>(s); }, ForceBegins::BeforeIt));
   Effect pull = plain_effect("lateral_force", "", "m/s^2",
                              "something pulls the liquid sideways: wind, or a table that "
                              "is not level",
                              {"x", 0, -1.2, 1.2, 0.03},
                              "simulator.force<BodyAcceleration<float>>().pull = @ * level[0] + @ * level[1];");
   pull.components.push_back({"y", 0, -1.2, 1.2, 0.03});
-  effects.push_back(force_effect<BodyAcceleration<Scalar>, Model>(pull, detail::level_pull<Scalar>(gravity)));
+  effects.push_back(
+      force_effect<BodyAcceleration<Scalar>, Model>(pull, detail::level_pull<Scalar>(gravity), ForceBegins::BeforeIt));
   const double weight = gravity.norm();
   if (weight == 0) {
     return effects;

@@ -5,8 +5,12 @@
 /// the gap shrinks on recordings that were not used.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -74,7 +78,7 @@ class MissingEffectSearch {
     expects(settings_.most_left > 0, "MissingEffectSettings: most_left", "> 0", settings_.most_left);
     expects(settings_.promising_factor >= 0, "MissingEffectSettings: promising_factor", ">= 0",
             settings_.promising_factor);
-    expects(settings_.alike_factor >= 1, "MissingEffectSettings: alike_factor", ">= 1", settings_.alike_factor);
+    expects(settings_.sure >= 0 && settings_.sure <= 1, "MissingEffectSettings: sure", "0 .. 1", settings_.sure);
     expects(settings_.most_unlike >= 0, "MissingEffectSettings: most_unlike", ">= 0", settings_.most_unlike);
     expects(settings_.least_references >= 2, "MissingEffectSettings: least_references", ">= 2",
             settings_.least_references);
@@ -89,7 +93,7 @@ class MissingEffectSearch {
     RecordingComparison<Model> compare(make, settings_, references_);
     EffectRefiner<Model> refine(make, settings_, learn_);
     compare.consult_references();
-    bool explained = false;
+    std::vector<Stage> stages;
     for (int round = 0; round < settings_.most_effects; ++round) {
       ComparedRecordings known = compare(
           learn_, effects(), round == 0 ? settings_.dictionary : settings_.next_dictionary, applied(result.found));
@@ -132,18 +136,24 @@ class MissingEffectSearch {
           !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
       const bool explains = leaves_little && refined.front().share >= least;
       if (round == 0) {
+        std::vector<Evidence> evidence;
         for (const RefinedTogether& each : refined) {
           result.refined.push_back(each.effects.front());
+          evidence.push_back(each.evidence);
         }
+        set_probabilities(result.refined, evidence);
       }
-      if (!gains || (explained && !explains)) {  // what was found before stands
+      if (!gains || (!stages.empty() && stages.back().explains && !explains)) {  // what was found before stands
         break;
       }
       result.found = refined.front().effects;
+      if (round == 0) {
+        result.found = {result.refined.front()};  // with its probability
+      }
       result.learn.after = refined.front().distance;
-      explained = explains;
-      if (round == 0 && explained) {
-        result.one_of = alike(result.refined, known.chance, result.learn.before);
+      stages.push_back({result.found, result.learn.after, explains});
+      if (round == 0 && explains) {
+        result.one_of = undecided(result.refined, known.chance, result.learn.before);
       }
       if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
           (leaves_little && refined.front().share >= settings_.enough_share) ||
@@ -151,6 +161,14 @@ class MissingEffectSearch {
         break;
       }
     }
+    std::optional<ComparedRecordings> others;
+    if (!held_out_.empty() && !stages.empty()) {
+      others = compare(held_out_, {}, settings_.dictionary);
+      drop_idle(*others, make, result.learn.by_chance, stages);
+      result.found = stages.back().found;
+      result.learn.after = stages.back().after;
+    }
+    const bool explained = !stages.empty() && stages.back().explains;
     if (result.judgement.has_gap()) {
       result.verdict = !explained ? Verdict::Unexplained : result.one_of.size() > 1 ? Verdict::OneOf : Verdict::Named;
     }
@@ -158,14 +176,21 @@ class MissingEffectSearch {
       result.found.clear();
       result.learn.after = result.learn.before;
     }
-    if (!held_out_.empty() && !result.found.empty()) {
-      check(compare(held_out_, {}, settings_.dictionary), make, result);
+    if (others && !result.found.empty()) {
+      check(*others, make, result);
     }
     result.runs = make.made();
     return result;
   }
 
  private:
+  /// What was found after a round.
+  struct Stage {
+    std::vector<RefinedEffect> found;
+    double after;   ///< what is left of the recordings learnt from
+    bool explains;  ///< enough of them
+  };
+
   static std::vector<AppliedEffect> applied(const std::vector<RefinedEffect>& effects) {
     std::vector<AppliedEffect> result;
     for (const RefinedEffect& each : effects) {
@@ -185,28 +210,89 @@ class MissingEffectSearch {
     return recorded.standardised().cwiseQuotient(usual);
   }
 
-  /// Those of other families that explain as much as the best one, within chance, and more than chance alone does.
-  /// @param before the distance to the model without any.
-  std::vector<std::size_t> alike(const std::vector<RefinedEffect>& refined, const ChanceLevel& chance,
-                                 double before) const {
+  /// Those that are the answer with enough probability together, the most probable ones first, if they are several;
+  /// what explains no more than chance does is none of them. @param before the distance to the model without any.
+  std::vector<std::size_t> undecided(std::vector<RefinedEffect> refined, const ChanceLevel& chance,
+                                     double before) const {
+    std::stable_sort(refined.begin(), refined.end(),
+                     [](const auto& a, const auto& b) { return a.probability > b.probability; });
     std::vector<std::size_t> result;
     std::set<std::string> answers;
-    const double least = settings_.alike_factor * chance.fall;
-    for (const RefinedEffect& each : refined) {  // the best one first
-      const bool near = relative_fall(each.distance, refined.front().distance) < least;
-      const bool explains = answers.empty() || relative_fall(before, each.distance) > chance.fall;
-      if (near && explains && answers.insert(answer(each)).second) {
+    double together = 0;
+    for (const RefinedEffect& each : refined) {
+      const bool explains = relative_fall(before, each.distance) > chance.fall;
+      if (together < settings_.sure && explains && answers.insert(answer(each)).second) {
+        together += each.probability;
         result.push_back(each.effect);
       }
     }
-    return result;
+    return result.size() > 1 ? result : std::vector<std::size_t>();
   }
+
+  /// Of answers, by the best effect of each. @param evidence for each effect.
+  void set_probabilities(std::vector<RefinedEffect>& of, const std::vector<Evidence>& evidence) const {
+    std::map<std::string, std::size_t> place;
+    std::vector<Evidence> best;
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      const auto [entry, is_new] = place.try_emplace(answer(of[k]), best.size());
+      if (is_new) {
+        best.push_back(evidence[k]);
+      } else if (evidence[k].value > best[entry->second].value) {
+        best[entry->second] = evidence[k];
+      }
+    }
+    const std::vector<double> probability = probabilities(best);
+    for (RefinedEffect& each : of) {
+      each.probability = probability[place.at(answer(each))];
+    }
+  }
+
   const std::string& answer(const RefinedEffect& of) const { return effects()[of.effect].answer(); }
 
   /// Whether it may pay to look for one more. Of effects that are all as strong, n of n + 1 explain that share; the
   /// strongest are found first.
   bool is_promising(double share, double effects) const {
     return share >= settings_.promising_factor * effects / (effects + 1);
+  }
+
+  /// An effect that was added to others has to explain some of what was not learnt from, too: what the first ones leave
+  /// may be how the model has them, and something that is not there would stand for it in the recordings learnt from
+  /// alone. Where others are predicted no better with it, it is taken back.
+  void drop_idle(const ComparedRecordings& others, InteractionRuns<Model>& make, double by_chance,
+                 std::vector<Stage>& stages) const {
+    if (stages.size() < 2) {
+      return;
+    }
+    std::vector<std::vector<AppliedEffect>> sets;
+    for (const Stage& stage : stages) {
+      sets.push_back(applied(stage.found));
+    }
+    const std::vector<DistanceLeft> left = left_of_held_out(others, make, sets);
+    for (std::size_t last = stages.size() - 1; last > 0; --last) {
+      const double without = left[last - 1].value, with = left[last].value;
+      const bool helps = relative_fall(without, with) > by_chance;
+      const bool harms = relative_fall(with, without) > by_chance;
+      if (helps || (without <= others.chance.largest_distance && !harms)) {  // or there was nothing left to explain
+        break;
+      }
+      stages.pop_back();
+    }
+  }
+
+  /// Of the recordings that were not used, with each of some sets of effects; all have the same seeds.
+  std::vector<DistanceLeft> left_of_held_out(const ComparedRecordings& known, InteractionRuns<Model>& make,
+                                             const std::vector<std::vector<AppliedEffect>>& sets) const {
+    const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
+    std::vector<typename InteractionRuns<Model>::Run> runs;
+    for (const auto& set : sets) {
+      std::uint32_t seed = 9501;
+      for (const Interaction<Model>& of : held_out_) {
+        for (std::size_t k = 0; k < seeds; ++k) {
+          runs.emplace_back(&of, ModelRun{set, seed++, false});
+        }
+      }
+    }
+    return distances_left(make, runs, seeds, known.recorded);
   }
 
   /// Predicts recordings that were not used, with what was found and with its rivals, strengths as they were found.
@@ -218,25 +304,21 @@ class MissingEffectSearch {
     }
     gap.noise = known.chance.distance;
     gap.by_chance = result.learn.by_chance;
-    const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
     std::vector<std::vector<AppliedEffect>> sets{applied(result.found)};
-    for (const RefinedEffect& rival : result.refined) {
-      if (answer(rival) != answer(result.found.front())) {
-        sets.push_back({rival.applied()});
+    std::vector<std::size_t> rivals;  // of those refined; the first one is what was found
+    for (std::size_t k = 0; k < result.refined.size(); ++k) {
+      if (answer(result.refined[k]) != answer(result.found.front())) {
+        rivals.push_back(k);
+        sets.push_back({result.refined[k].applied()});
       }
     }
-    std::vector<typename InteractionRuns<Model>::Run> runs;
-    for (const auto& set : sets) {
-      for (const Interaction<Model>& of : held_out_) {
-        for (std::size_t k = 0; k < seeds; ++k) {
-          runs.emplace_back(&of, ModelRun{set, static_cast<std::uint32_t>(9501 + runs.size()), false});
-        }
-      }
+    std::vector<DistanceLeft> after = left_of_held_out(known, make, sets);
+    if (result.found.size() == 1 && gap.before >= known.chance.largest_distance) {
+      weigh(rivals, known.chance, after, result);
     }
-    const std::vector<double> after = distances_left(make, runs, seeds, known.recorded);
-    gap.after = after.front();
-    if (after.size() > 1) {
-      gap.best_rival = *std::min_element(after.begin() + 1, after.end());
+    gap.after = after.front().value;
+    for (std::size_t k = 1; k < after.size(); ++k) {
+      gap.best_rival = k > 1 ? std::min(gap.best_rival, after[k].value) : after[k].value;
     }
     if (gap.before < known.chance.largest_distance) {
       result.confirmation = Confirmation::NotTestable;
@@ -245,6 +327,39 @@ class MissingEffectSearch {
       const bool best = !(gap.best_rival < gap.after);
       result.confirmation = shrinks && best ? Confirmation::Confirmed : Confirmation::Refuted;
     }
+  }
+
+  /// Takes recordings that were not used for evidence, too: of several effects that those learnt from leave, it may be
+  /// that of one only.
+  /// @param rivals of the first of those refined, by their places there. @param after what is left of these recordings
+  /// with the first one, then with each of its rivals; where one of these is the answer, they change places.
+  void weigh(const std::vector<std::size_t>& rivals, ChanceLevel chance, std::vector<DistanceLeft>& after,
+             MissingEffect& result) const {
+    std::vector<RefinedEffect>& refined = result.refined;
+    chance.fall = result.learn.by_chance;
+    std::vector<Evidence> evidence(refined.size(), {-std::numeric_limits<double>::infinity(), 0});
+    for (std::size_t k = 0; k < after.size(); ++k) {
+      const std::size_t which = k == 0 ? 0 : rivals[k - 1];
+      evidence[which] = evidence_of(after[k].value, after[k].deviation, chance);
+      evidence[which].value += std::log(refined[which].probability);
+    }
+    set_probabilities(refined, evidence);
+    if (result.verdict == Verdict::OneOf) {
+      result.one_of = undecided(refined, result.judgement.chance, result.learn.before);
+      std::size_t best = 0;  // 0: the first one; rivals from 1 on
+      for (std::size_t k = 1; k < after.size(); ++k) {
+        const std::size_t nearest = best == 0 ? 0 : rivals[best - 1];
+        best = evidence[rivals[k - 1]].value > evidence[nearest].value ? k : best;
+      }
+      if (best > 0) {
+        std::swap(refined.front(), refined[rivals[best - 1]]);
+        std::swap(after.front(), after[best]);
+      }
+      result.verdict = result.one_of.size() > 1 ? Verdict::OneOf : Verdict::Named;
+      result.told_apart_by_others = result.verdict == Verdict::Named;
+    }
+    result.found = {refined.front()};
+    result.learn.after = refined.front().distance;
   }
 
   std::vector<Interaction<Model>> learn_, held_out_, references_;

@@ -31,6 +31,8 @@ struct RefinedEffect {
   std::optional<TimeWindow> window{};      ///< likewise
   double distance = 0;                     ///< that is left of the recordings it was found in
   double share = 0;                        ///< of what is reducible, at most 1
+  /// That it is what is missing, alone, if one of those that were refined first is; by all recordings.
+  double probability = std::numeric_limits<double>::quiet_NaN();
 
   AppliedEffect applied() const { return {effect, strength, place, window}; }
   /// Strengths that hold the truth with 90 %, by component.
@@ -62,12 +64,14 @@ struct GapChange {
 /// What was found.
 struct MissingEffect {
   Verdict verdict = Verdict::Nothing;
-  std::vector<RefinedEffect> found{};    ///< one after another; of OneOf the best of the first ones
-  std::vector<RefinedEffect> refined{};  ///< all that were looked at closely in the first round, the best first
-  std::vector<std::size_t> one_of{};     ///< of OneOf: numbers of effects that are not told apart
-  Judgement judgement{};                 ///< of the first round, before refinement
-  std::vector<Effect> judged{};          ///< what its numbers are of: the models' effects, and then those of them that
-                                         ///< were also tried where recordings begin to disagree
+  std::vector<RefinedEffect> found{};  ///< one after another; of OneOf the best of the first ones
+  std::vector<RefinedEffect>
+      refined{};                      ///< all that were looked at closely in the first round, the most probable first
+  std::vector<std::size_t> one_of{};  ///< of OneOf: numbers of effects that are not told apart
+  bool told_apart_by_others = false;  ///< the recordings learnt from leave several; those held out, one of them
+  Judgement judgement{};              ///< of the first round, before refinement
+  std::vector<Effect> judged{};       ///< what its numbers are of: the models' effects, and then those of them that
+                                      ///< were also tried where recordings begin to disagree
   std::vector<std::vector<Disagreement>> where{};              ///< in pictures, by recording, before anything was added
   std::vector<std::vector<ReadingDisagreement>> where_read{};  ///< the same of sensors
   std::vector<SmallestSeen> smallest_seen{};                   ///< of each effect that is judged

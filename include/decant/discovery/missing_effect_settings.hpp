@@ -31,8 +31,8 @@ struct MissingEffectSettings {
                                   ///< what is left may be how the model has them
   double promising_factor = 0.8;  ///< on n / (n + 1), >= 0: unless n effects explain so much, no further one is
                                   ///< looked for
-  double alike_factor = 2;        ///< on what chance explains, >= 1: what explains less than so much more is no
-                                  ///< better an answer
+  double sure = 0.9;              ///< how probable an effect has to be among those that were refined to be the
+                                  ///< answer, 0 .. 1; else it is one of those that are so together
   int most_effects = 3;           ///< that are added one after another, >= 1
   double reference_factor = 1.1;  ///< on what references do, >= 1: beyond it something is missing
   double most_unlike = 0.5;       ///< references that look more unlike a recording teach nothing about how its

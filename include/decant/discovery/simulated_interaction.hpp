@@ -76,15 +76,17 @@ struct InteractionScene {
 /// What effects can change about a run.
 template <class Model>
 struct InteractionChanges {
-  double first = 0;                                     ///< the first frame, from which models run on [s]
-  double fill = 1;                                      ///< over what the model assumes
-  double pose_delay = 0;                                ///< poses were recorded so late [s]
-  double start_delay = 0;                               ///< all happens so much later than the clock says [s]
-  std::vector<Vector3<double>> body_offset{};           ///< by body: where it is off its recorded pose [m], world frame
-  Eigen::Vector2d camera_shift{0, 0};                   ///< of the picture [px]
-  double camera_roll = 0;                               ///< of the picture about its middle, clockwise [rad]
-  double mask_growth = 0;                               ///< of silhouettes on all sides [px]
-  std::vector<double> sensor_gain{};                    ///< by sensor: so much of each change since the first frame
+  double first = 0;                            ///< the first frame, from which models run on [s]
+  double fill = 1;                             ///< over what the model assumes
+  double pose_delay = 0;                       ///< poses were recorded so late [s]
+  double start_delay = 0;                      ///< all happens so much later than the clock says [s]
+  std::vector<Vector3<double>> body_offset{};  ///< by body: where it is off its recorded pose [m], world frame
+  Eigen::Vector2d camera_shift{0, 0};          ///< of the picture [px]
+  double camera_roll = 0;                      ///< of the picture about its middle, clockwise [rad]
+  double mask_growth = 0;                      ///< of silhouettes on all sides [px]
+  std::vector<double> sensor_gain{};           ///< by sensor: so much of each change since the first frame
+  /// Done to the model before liquid comes to rest once more, if there is any.
+  std::vector<std::function<void(Model&)>> before_settling{};
   std::vector<std::function<void(Model&)>> of_model{};  ///< done to the model before it starts
 };
 
@@ -343,6 +345,12 @@ class SimulatedInteraction {
   }
 
   static void change(Model& model, const Changes& changes) {
+    for (const auto& change : changes.before_settling) {
+      change(model);
+    }
+    if (!changes.before_settling.empty()) {
+      model.settle(1, 0.002);
+    }
     for (const auto& change : changes.of_model) {
       change(model);
     }
