@@ -82,6 +82,7 @@
 #include <decant/discovery/missing_effect.hpp>
 #include <decant/discovery/missing_effect_result.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
+#include <decant/discovery/next_interaction.hpp>
 #include <decant/discovery/nuisance_space.hpp>
 #include <decant/discovery/silhouette_features.hpp>
 #include <decant/discovery/silhouette_gap.hpp>

@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -63,34 +64,41 @@ inline double distance_left(const RecordedEvidence& of, std::vector<Observation>
 
 }  // namespace detail
 
-/// What is left with the mean of some runs in place of the model as it is, set after set; infinite where a run failed.
-/// @param runs `seeds` of them for each recording in turn, set after set.
+/// What is left with the mean of some runs in place of the model as it is; infinite where a run failed.
+/// @param runs as many of each recording in turn.
+inline DistanceLeft distance_left(std::span<const RecordedEvidence> recorded, std::span<const Observation> runs) {
+  DistanceLeft left;
+  double variance = 0;
+  const auto count = static_cast<double>(recorded.size());
+  const std::size_t seeds = runs.size() / recorded.size();
+  for (const RecordedEvidence& of : recorded) {
+    const std::vector<Observation> own(runs.begin(), runs.begin() + static_cast<std::ptrdiff_t>(seeds));
+    runs = runs.subspan(seeds);
+    left.value += detail::distance_left(of, own) / count;
+    // the jackknife (Efron and Tibshirani, An Introduction to the Bootstrap, 1993)
+    double sum = 0, squares = 0;
+    for (std::size_t k = 0; seeds > 1 && k < seeds; ++k) {
+      const double one = detail::distance_left(of, own, k);
+      sum += one;
+      squares += one * one;
+    }
+    const auto runs_of = static_cast<double>(seeds);
+    variance += std::max(0.0, squares - sum * sum / runs_of) * (runs_of - 1) / runs_of / (count * count);
+  }
+  left.deviation = std::isfinite(left.value) ? std::sqrt(variance) : 0;
+  return left;
+}
+
+/// The same, set after set. @param runs `seeds` of them for each recording in turn, set after set.
 template <ForwardModel Model>
 std::vector<DistanceLeft> distances_left(InteractionRuns<Model>& make,
                                          const std::vector<typename InteractionRuns<Model>::Run>& runs,
                                          std::size_t seeds, const std::vector<RecordedEvidence>& recorded) {
   const std::vector<Observation> seen = make(runs);
+  const std::size_t in_set = seeds * recorded.size();
   std::vector<DistanceLeft> result;
-  const auto count = static_cast<double>(recorded.size());
-  for (auto next = seen.begin(); next < seen.end();) {
-    DistanceLeft left;
-    double variance = 0;
-    for (const RecordedEvidence& of : recorded) {
-      const std::vector<Observation> own(next, next + static_cast<std::ptrdiff_t>(seeds));
-      next += static_cast<std::ptrdiff_t>(seeds);
-      left.value += detail::distance_left(of, own) / count;
-      // the jackknife (Efron and Tibshirani, An Introduction to the Bootstrap, 1993)
-      double sum = 0, squares = 0;
-      for (std::size_t k = 0; seeds > 1 && k < seeds; ++k) {
-        const double one = detail::distance_left(of, own, k);
-        sum += one;
-        squares += one * one;
-      }
-      const auto runs_of = static_cast<double>(seeds);
-      variance += std::max(0.0, squares - sum * sum / runs_of) * (runs_of - 1) / runs_of / (count * count);
-    }
-    left.deviation = std::isfinite(left.value) ? std::sqrt(variance) : 0;
-    result.push_back(left);
+  for (std::size_t k = 0; k < seen.size(); k += in_set) {
+    result.push_back(distance_left(recorded, std::span(seen).subspan(k, in_set)));
   }
   return result;
 }
