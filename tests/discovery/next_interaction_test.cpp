@@ -106,6 +106,8 @@ TEST_CASE("next interaction: models that fail tell nothing, and what is asked is
   CHECK_THROWS_WITH(advise({either[0]}, {}), decant_test::contains("possible effects"));
   CHECK_THROWS_WITH(advise({either[0], possible(drag, 1, 0)}, {}), decant_test::contains("probability"));
   CHECK_THROWS_WITH(advise(either, {}, 0), decant_test::contains("simulated"));
+  CHECK_THROWS_WITH(advise(either, {{"steep", &steep, {}, {}}, {"steep", &broken, {}, {}}}),
+                    decant_test::contains("all different"));
   CHECK_THROWS_WITH(advise(either, {{"none", nullptr, {}, {}}}), decant_test::contains("model of 'none'"));
 }
 

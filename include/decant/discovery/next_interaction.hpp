@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -125,7 +126,9 @@ std::vector<InteractionAdvice> advise_next_interaction(const std::vector<Possibl
   const auto draws = static_cast<std::size_t>(simulated);
   const std::vector<PlannedRun> plan = plan_dictionary({}, settings.dictionary);
   std::vector<Run> runs;
+  std::set<std::string> names;
   for (Interaction<Model>& each : proposed) {
+    expects(names.insert(each.name).second, "advise_next_interaction: names", "all different", each.name);
     expects(each.model != nullptr, "advise_next_interaction: model of '" + each.name + "'", "one", "none");
     if (each.recording.empty()) {
       each.recording = each.model->predict({});
@@ -169,6 +172,9 @@ std::vector<InteractionAdvice> advise_next_interaction(const std::vector<Possibl
     for (std::size_t effect = 0; effect < possible.size(); ++effect) {
       with.emplace_back(next, next + static_cast<std::ptrdiff_t>(seeds));
       next += static_cast<std::ptrdiff_t>(seeds + draws);
+    }
+    if (dictionary.of_role(RunRole::Baseline).empty() || dictionary.of_role(RunRole::Draw).size() < 5) {
+      continue;  // the model fails there nearly always
     }
     std::vector<detail::JudgedDraw> judged;
     for (std::size_t truth = 0; truth < possible.size(); ++truth) {
