@@ -19,6 +19,7 @@
 
 #include <decant/boundary/shapes.hpp>
 #include <decant/kernel/cubic_spline.hpp>
+#include <decant/kernel/lattice.hpp>
 #include <decant/neighbor/cell_grid.hpp>
 #include <decant/simulation/parts.hpp>
 #include <decant/simulation/simulator.hpp>
@@ -143,10 +144,10 @@ double mean_compression(const PointArray<float>& position_float, const decant::R
   grid.rebuild(position, 2 * h, {1});
   decant::WallState<float> walls;
   bodies.sample(position_float, spacing, {1}, walls);
+  const double own = decant::own_value<decant::CubicSpline<double>>(h, spacing);
   double total = 0;
   for (Index i = 0; i < position.cols(); ++i) {
-    double density =
-        mass * decant::CubicSpline<double>::value(0.0, h) + rest_density * static_cast<double>(walls.share[i]);
+    double density = mass * own + rest_density * static_cast<double>(walls.share[i]);
     grid.for_each(i, [&](Index, double r_squared) {
       density += mass * decant::CubicSpline<double>::value(std::sqrt(r_squared), h);
     });

@@ -129,6 +129,7 @@
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/kernel/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>
+#include <decant/kernel/lattice.hpp>
 #include <decant/kernel/mueller_viscosity.hpp>
 #include <decant/kernel/poly6.hpp>
 #include <decant/kernel/spiky.hpp>

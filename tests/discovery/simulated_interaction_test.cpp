@@ -119,24 +119,13 @@ double wet_area(const SilhouetteSeries& seen) {
   }
   return sum;
 }
-double mean_row(const SilhouetteSeries& seen) {
-  double sum = 0;
-  for (std::size_t frame = 0; frame < seen.frames(); ++frame) {
-    for (Index row = 0; row < seen.rows(); ++row) {
-      for (Index column = 0; column < seen.columns(); ++column) {
-        sum += static_cast<double>(row) * static_cast<double>(seen.share(frame, row, column));
-      }
-    }
-  }
-  return sum / wet_area(seen);
-}
-double apart(const SilhouetteSeries& a, const SilhouetteSeries& b, Index columns_on = 0) {
+double apart(const SilhouetteSeries& a, const SilhouetteSeries& b, Index columns_on = 0, Index rows_on = 0) {
   double sum = 0;
   for (std::size_t frame = 0; frame < a.frames(); ++frame) {
-    for (Index row = 0; row < a.rows(); ++row) {
+    for (Index row = 0; row + rows_on < a.rows(); ++row) {
       for (Index column = 0; column + columns_on < a.columns(); ++column) {
         sum += std::abs(static_cast<double>(a.share(frame, row, column)) -
-                        static_cast<double>(b.share(frame, row, column + columns_on)));
+                        static_cast<double>(b.share(frame, row + rows_on, column + columns_on)));
       }
     }
   }
@@ -191,7 +180,7 @@ TEST_CASE("simulated interaction: errors of a camera change its picture alone") 
   const auto shifted = pour.predict(run_with(pour, "camera_shift", {10, 0})).silhouettes;
   CHECK(apart(plain[0], shifted[0], 1) < 0.1 * apart(plain[0], shifted[0]));
   const auto lower = pour.predict(run_with(pour, "camera_shift", {0, 10})).silhouettes;
-  CHECK(mean_row(lower[0]) - mean_row(plain[0]) == Approx(1).epsilon(0.1));  // v points down
+  CHECK(apart(plain[0], lower[0], 0, 1) < 0.1 * apart(plain[0], lower[0]));  // v points down
   CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {2})).silhouettes[0]) > 1.1 * wet_area(plain[0]));
   CHECK(wet_area(pour.predict(run_with(pour, "mask_bias", {-2})).silhouettes[0]) < 0.95 * wet_area(plain[0]));
   // a turn of the picture about its middle by a quarter takes what is above it to the right

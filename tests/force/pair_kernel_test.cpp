@@ -8,6 +8,7 @@
 #include <limits>
 
 #include <decant/kernel/cubic_spline.hpp>
+#include <decant/kernel/lattice.hpp>
 #include <decant/kernel/wendland_c2.hpp>
 #include <decant/testing/force.hpp>
 
@@ -24,6 +25,11 @@ double density_by_all(const LooseLiquid<Kernel>& liquid, Index i) {
   const auto h = static_cast<double>(liquid.smoothing_length);
   double density = static_cast<double>(liquid.rest_density * liquid.walls.share[i]);
   for (Index j = 0; j < liquid.fluid.size(); ++j) {
+    if (j == i) {
+      density += static_cast<double>(liquid.fluid.mass[i]) *
+                 decant::own_value<KernelOfDouble>(h, static_cast<double>(liquid.spacing));
+      continue;
+    }
     const decant::Vector3<double> apart =
         (liquid.fluid.position.col(i) - liquid.fluid.position.col(j)).template cast<double>();
     density += static_cast<double>(liquid.fluid.mass[j]) * KernelOfDouble::value(apart.norm(), h);

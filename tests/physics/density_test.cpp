@@ -8,6 +8,7 @@
 #include <tuple>
 #include <vector>
 
+#include <decant/kernel/lattice.hpp>
 #include <decant/neighbor/brute_force.hpp>
 #include <decant/simulation/simulator.hpp>
 
@@ -34,7 +35,7 @@ struct DensityWatch {
     pairs_.rebuild(fluid.position, Kernel::support_factor * h);
     double total = 0, most = 0;
     for (Index i = 0; i < fluid.size(); ++i) {
-      double density = fluid.mass[i] * Kernel::value(0.0, h) + rest * step.walls.share[i];
+      double density = fluid.mass[i] * decant::own_value<Kernel>(h, step.spacing) + rest * step.walls.share[i];
       pairs_.for_each(
           i, [&](Index j, double r_squared) { density += fluid.mass[j] * Kernel::value(std::sqrt(r_squared), h); });
       difference = std::max(difference, std::abs(density - fluid.density[i]) / rest);

@@ -10,6 +10,7 @@
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
+#include <decant/kernel/lattice.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -29,7 +30,12 @@ class PairKernel {
     using B = Batch<Scalar>;
     const Index count = step.fluid.size();
     const Scalar h = step.smoothing_length;
-    const Scalar own = Kernel::value(Scalar(0), h);
+    if (h != smoothing_length_ || step.spacing != spacing_) {
+      smoothing_length_ = h;
+      spacing_ = step.spacing;
+      own_value_ = decant::own_value<Kernel>(static_cast<double>(h), static_cast<double>(step.spacing));
+    }
+    const Scalar own = own_value_;
     slope_.resize(step.neighbors.index_size());
     const auto& mass = step.fluid.mass;
     common_mass_ = count > 0 && (mass.array() == mass[0]).all() ? mass[0] : Scalar(0);
@@ -52,9 +58,14 @@ class PairKernel {
   /// The mass of all particles; 0 where it is not the same for all [kg].
   Scalar common_mass() const noexcept { return common_mass_; }
 
+  /// What a particle's mass counts for in its own density, of the last compute [1/m^3]: see kernel/lattice.hpp.
+  Scalar own_value() const noexcept { return own_value_; }
+
  private:
   std::vector<Scalar> slope_{};
   Scalar common_mass_ = 0;
+  Scalar smoothing_length_ = 0, spacing_ = 0;  ///< that own_value_ is for
+  Scalar own_value_ = 0;
 };
 
 }  // namespace decant::inline DECANT_TARGET

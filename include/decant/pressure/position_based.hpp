@@ -222,7 +222,7 @@ class PositionBased {
             const Scalar fraction = step.walls.share[i] + wall[0] * record[0] + wall[1] * record[1] +
                                     wall[2] * record[2] - step.time_step * step.walls.flux[i];
             const Scalar share = std::max(fraction, Scalar(0));
-            const Scalar excess = (sum(density) + record[3] * Kernel::value(Scalar(0), h)) / rho + share - 1;
+            const Scalar excess = (sum(density) + record[3] * step.pairs.own_value()) / rho + share - 1;
             const Scalar beyond = excess - allowed_[own];
             partial.all += static_cast<double>(std::max(excess, Scalar(0)));
             partial.beyond += static_cast<double>(std::max(beyond, Scalar(0)));

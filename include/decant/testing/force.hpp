@@ -18,6 +18,7 @@
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/force/step_view.hpp>
+#include <decant/kernel/lattice.hpp>
 #include <decant/neighbor/brute_force.hpp>
 #include <decant/neighbor/neighbor_list.hpp>
 #include <decant/testing/law.hpp>
@@ -79,8 +80,9 @@ struct LooseLiquid {
                     static_cast<Scalar>(static_cast<double>(Kernel::support_factor) * (1 + margin)) * smoothing_length,
                     threads);
     pairs.compute(view());
+    const Scalar own = own_value<Kernel>(static_cast<double>(smoothing_length), static_cast<double>(spacing));
     for (Index i = 0; i < fluid.size(); ++i) {  // once more, in a way of its own
-      Scalar density = fluid.mass[i] * Kernel::value(Scalar(0), smoothing_length);
+      Scalar density = fluid.mass[i] * own;
       neighbors.for_each(i, [&](Index j, const Vector3<Scalar>&, Scalar r_squared) {
         density += fluid.mass[j] * Kernel::value(std::sqrt(r_squared), smoothing_length);
       });
