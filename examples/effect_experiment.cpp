@@ -28,7 +28,9 @@ int main(int count, char** values) {
   app.add_option("folder", folder, "where recordings, runs and answers are kept")->required();
   app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
       ->transform(CLI::CheckedTransformer(example::case_ranges()));
-  app.add_option("--kinds", kinds, "nothing, moderate, weak, outside, measurement, cylinder; several by commas")
+  app.add_option(
+         "--kinds", kinds,
+         "nothing, moderate, weak, two, outside, measurement, cylinder, cylinder_two, junction; several by commas")
       ->delimiter(',')
       ->check(CLI::IsMember(example::case_kinds()));
   app.add_option("--first", first, "number of the first case of each kind")->check(CLI::Range(0, 1000000));

@@ -62,7 +62,8 @@ std::map<std::string, double> numbers_by_name(const std::string& option, const s
 int main(int count, char** values) {
   const example::SweepSession session;
   std::string json_file, report_file, journal_file;
-  std::vector<std::string> learn_folders, held_out_folders, reference_folders, tolerances, reading_errors;
+  std::vector<std::string> learn_folders, held_out_folders, reference_folders, proposed_folders, tolerances,
+      reading_errors;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double usual_spacing_mm = 1e3 * options.model.spacing;
@@ -78,6 +79,9 @@ int main(int count, char** values) {
       "--reference", reference_folders,
       "folders of recordings, of any pours, in which nothing is missing: how far reality is from the model; two or "
       "more that went like those to learn from tell best");
+  app.add_option("--propose", proposed_folders,
+                 "folders of interactions that may be recorded next, as recordings without pictures: where several "
+                 "effects are left, says how well each would tell them apart");
   app.add_option("--journal", journal_file, "keeps the result of each run: a search that was stopped goes on");
   app.add_option("--json", json_file, "writes what was found");
   app.add_option("--report", report_file, "writes a page with a film, charts and tables, for a browser");
@@ -108,7 +112,7 @@ int main(int count, char** values) {
     options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
     options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
     std::map<std::string, example::InteractionSource> sources;
-    for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders}) {
+    for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders, &proposed_folders}) {
       for (const std::string& folder : *folders) {
         sources[folder] = example::read_interaction_source(folder);
         options.gain_of.merge(example::uncertain_gains(example::recording_of(sources[folder])));
@@ -120,17 +124,19 @@ int main(int count, char** values) {
     const double model_mm = spacing_mm.value_or(usual_spacing_mm);
     options.model.spacing = 1e-3 * model_mm;
     std::vector<std::unique_ptr<example::RecordedInteraction>> kept;
-    const auto interactions_of = [&](const std::vector<std::string>& folders) {
+    const auto interactions_of = [&](const std::vector<std::string>& folders, bool planned = false) {
       Interactions interactions;
+      options.planned = planned;
       for (const std::string& folder : folders) {
         kept.push_back(
             std::make_unique<example::RecordedInteraction>(example::interaction_of(sources.at(folder), options)));
         interactions.push_back(kept.back()->interaction(folder));
       }
+      options.planned = false;
       return interactions;
     };
     Interactions learn = interactions_of(learn_folders), held_out = interactions_of(held_out_folders),
-                 references = interactions_of(reference_folders);
+                 references = interactions_of(reference_folders), proposed = interactions_of(proposed_folders, true);
     const std::vector<decant::Effect>& effects = kept.front()->model.effects();
     const auto planned =
         static_cast<double>(decant::plan_dictionary(effects, settings.dictionary).size() * learn_folders.size());
@@ -157,16 +163,28 @@ int main(int count, char** values) {
     decant::MissingEffect result;
     {
       const decant::Stopwatch watch(milliseconds);
+      settings = example::search_settings(settings, options);
       result = decant::MissingEffectSearch<example::RecordedModel>(std::move(learn), std::move(held_out), run_jobs,
-                                                                   example::search_settings(settings, options),
-                                                                   std::move(references))
+                                                                   settings, std::move(references))
                    .find();
+    }
+    const std::vector<decant::PossibleEffect> possible = decant::possible_effects(result, effects);
+    std::vector<decant::InteractionAdvice> advice;
+    if (possible.size() > 1 && !proposed.empty()) {
+      for (const decant::Interaction<example::RecordedModel>& each : proposed) {
+        example::expect_same_effects(effects, each.model->effects(), each.name);
+      }
+      advice = decant::advise_next_interaction(possible, std::move(proposed), result.learn, run_jobs, settings);
     }
     progress.finish();
     std::printf("%s\n%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
                 example::references_sentence(reference_folders.size(), result).c_str(),
                 example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
                 example::candidates_table(result.judged, result).text().c_str());
+    if (!proposed_folders.empty()) {
+      std::printf("%s", possible.size() < 2 ? "Nothing is left for a further recording to tell apart.\n"
+                                            : example::advice_table(proposed_folders, advice).text().c_str());
+    }
     std::vector<const example::RecordedInteraction*> interactions;
     std::vector<std::vector<std::string>> sensors;
     for (std::size_t k = 0; k < learn_folders.size() + held_out_folders.size(); ++k) {
@@ -195,6 +213,7 @@ int main(int count, char** values) {
         json["spacing_mm"] = model_mm;
         json["references"] = reference_folders.size();
         json["readings"] = example::readings_json(models, interactions);
+        json["advice"] = example::advice_json(proposed_folders, advice);
         example::write_result(json_file, json);
       }
       if (!report_file.empty()) {

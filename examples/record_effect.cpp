@@ -34,9 +34,10 @@ int main(int count, char** values) {
   app.add_option("--out", out, "new folder for the recordings a and b");
   app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
       ->transform(CLI::CheckedTransformer(example::case_ranges()));
-  app.add_option("--kind", kind,
-                 "moderate, weak, nothing, outside (what no method is told of), measurement or cylinder (one that a "
-                 "robot moves)")
+  app.add_option(
+         "--kind", kind,
+         "moderate, weak, two (effects at once), nothing, outside (what no method is told of), measurement, cylinder "
+         "(one that a robot moves), cylinder_two or junction")
       ->transform(CLI::CheckedTransformer(example::case_kinds()));
   auto* numbered = app.add_option("--case", number, "number of the case, from 0 on")->check(CLI::Range(0, 1000000));
   app.add_flag("--list", list, "names the cases of a kind and their scenarios, and records nothing");

@@ -18,14 +18,13 @@
 
 #include <nlohmann/json.hpp>
 
-#include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/pipe_blockage.hpp>
-#include <decant/boundary/pipe_openings.hpp>
 #include <decant/hypothesis/marginal.hpp>
 #include <decant/hypothesis/value_estimate.hpp>
 #include <decant/io/recording.hpp>
 
 #include "hypothesis_run.hpp"
+#include "junction_legs.hpp"
 #include "scouting.hpp"
 
 namespace example {
@@ -49,12 +48,6 @@ struct BlockageOptions {
   RelocationEvidence relocation{};  ///< by the default method, the only one that relocates
 };
 
-/// A way out of the junction.
-struct JunctionLeg {
-  std::string name;             ///< left, right; leg_1, leg_2 .. if there are more than two
-  decant::PipeSection section;  ///< where a blockage is tried, in the body's frame
-};
-
 struct BlockageResult {
   std::string junction;
   std::vector<JunctionLeg> legs;
@@ -66,60 +59,6 @@ struct BlockageResult {
   std::vector<std::pair<std::string, std::vector<double>>> configurations;
   std::vector<std::optional<decant::ValueEstimate>> leg_opening;  ///< by leg, 0 .. 1; nothing if it failed at once
 };
-
-/// The junction that is meant: the first body of that role. Throws std::runtime_error if there is none.
-inline std::size_t junction_of(const decant::Recording& recording) {
-  for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
-    if (recording.bodies[body].role == decant::recording::Role::Junction) {
-      return body;
-    }
-  }
-  throw std::runtime_error(recording.name + ": no junction: expected a body of the role 'junction'");
-}
-
-/// The ways out of a junction: all openings but the highest. Sorted from left to right as the first camera sees them
-/// at first, without a camera by x in the world. Throws std::runtime_error where there are fewer than two.
-inline std::vector<JunctionLeg> junction_legs(const decant::Recording& recording, std::size_t body) {
-  using namespace decant;
-  const recording::Body& junction = recording.bodies[body];
-  const Pose pose = junction.motion.at(recording.timestamps.front());
-  const BoundingVolumeHierarchy surface(junction.mesh);
-  std::vector<PipeOpening> openings = find_pipe_openings(surface);
-  std::erase_if(openings, [](const PipeOpening& opening) { return opening.passage != 0; });
-  if (openings.size() < 3) {
-    throw std::runtime_error(recording.name + ": body '" + junction.name + "' has " + std::to_string(openings.size()) +
-                             " openings that are joined inside; expected a way in and at least two out");
-  }
-  const Vector3<double> up = -recording.gravity.normalized();
-  const auto height = [&](const PipeOpening& opening) { return up.dot(pose * opening.rim.center); };
-  openings.erase(std::max_element(openings.begin(), openings.end(),
-                                  [&](const auto& a, const auto& b) { return height(a) < height(b); }));
-  const auto place = [&](const PipeOpening& opening) {
-    const Vector3<double> x = pose * opening.rim.center;
-    if (recording.cameras.empty()) {
-      return x.x();
-    }
-    const Vector3<double> seen = recording.cameras.front().view(0).camera_from_world * x;
-    return seen.x() / std::max(seen.z(), 1e-9);
-  };
-  std::stable_sort(openings.begin(), openings.end(), [&](const auto& a, const auto& b) { return place(a) < place(b); });
-  std::vector<JunctionLeg> legs;
-  for (const PipeOpening& opening : openings) {
-    const double radius = opening.rim.radius();
-    // Half-way to where the leg branches, through its corners: how much passes depends on where a leg is blocked, most
-    // of all on whether there is pipe behind it, and that is so along most of its way.
-    const std::vector<PipeSection> line = center_line(surface, opening.rim, 100 * radius, 0.25 * radius);
-    const auto half_way = std::find_if(line.begin(), line.end(), [&](const PipeSection& section) {
-      return section.distance >= 0.5 * line.back().distance;
-    });
-    JunctionLeg leg{"leg_" + std::to_string(legs.size() + 1), *half_way};
-    if (openings.size() == 2) {
-      leg.name = legs.empty() ? "left" : "right";
-    }
-    legs.push_back(std::move(leg));
-  }
-  return legs;
-}
 
 /// How many legs are not wholly open under a hypothesis, and whether one of them is this one.
 inline std::size_t blocked_legs(const BlockageResult& result, std::size_t hypothesis) {
@@ -271,6 +210,10 @@ inline BlockageResult find_blockage(const decant::Recording& recording, const Bl
   const std::size_t body = junction_of(recording);
   result.junction = recording.bodies[body].name;
   result.legs = junction_legs(recording, body);
+  if (result.legs.empty()) {
+    throw std::runtime_error(recording.name + ": body '" + recording.bodies[body].name +
+                             "': expected a pipe junction with a way in and at least two out that are joined inside");
+  }
   TrackingOptions tracking = options.tracking;
   double narrowest = std::numeric_limits<double>::infinity();
   for (const JunctionLeg& leg : result.legs) {

@@ -18,6 +18,7 @@
 
 #include "cylinder_scenarios.hpp"
 #include "effect_scenarios.hpp"
+#include "junction_scenarios.hpp"
 
 namespace example {
 
@@ -33,7 +34,10 @@ enum class CaseKind {
   Nothing,      ///< only what is tolerated
   Outside,      ///< something that no method is told of
   Measurement,  ///< the liquid is as the model has it, the measurement is not
-  Cylinder      ///< an effect in a cylinder that a robot moves, or an error of the measurement; heights alone are read
+  Cylinder,     ///< an effect in a cylinder that a robot moves, or an error of the measurement; heights alone are read
+  Two,          ///< two effects at once, each as strong as in Moderate
+  CylinderTwo,  ///< two of a cylinder's at once
+  Junction      ///< an effect in a pipe junction
 };
 
 /// A kind of effect, and how strong it is where it is moderate.
@@ -105,6 +109,17 @@ inline const std::vector<EffectEntry>& cylinder_effects() {
   return entries;
 }
 
+/// What a pipe junction may do.
+inline const std::vector<EffectEntry>& junction_effects() {
+  static const std::vector<EffectEntry> entries{
+      {"obstacle", "obstacle", "share", 0.55, 0.8},       // of a leg's bore, closed
+      {"leak", "leak", "ml/s", 25, 45},                   // out of a leg's underside
+      {"viscosity", "viscosity", "m^2/s", 5e-4, 1.2e-3},  // over that of water
+      {"inlet_flow", "inlet_flow", "share", 0.15, 0.30},  // less than recorded
+  };
+  return entries;
+}
+
 /// What is hidden in both pours of a case. Random numbers are drawn for all effects alike and used by those that have
 /// such a thing.
 struct HiddenEffect {
@@ -122,6 +137,15 @@ struct HiddenEffect {
   bool is(const char* other, const char* its_variant) const { return name == other && variant == its_variant; }
   decant::Vector3<double> level_direction() const { return {std::cos(angle), std::sin(angle), 0}; }
 };
+
+/// How strong effects of a name are together, and of one of their variants where that is given.
+inline double strength_of(const std::vector<HiddenEffect>& effects, const char* name, const char* variant = nullptr) {
+  double strength = 0;
+  for (const HiddenEffect& each : effects) {
+    strength += each.is(name) && (variant == nullptr || each.variant == variant) ? each.strength : 0;
+  }
+  return strength;
+}
 
 /// Errors that any recording has, within what is declared as tolerated. Of one pour.
 struct ToleratedErrors {
@@ -143,6 +167,18 @@ struct EffectCase {
   std::size_t scenario = 0;
   std::uint32_t seed = 1;
   HiddenEffect effect{};
+  HiddenEffect second{};  ///< of CaseKind::Two and CylinderTwo
+
+  /// What is hidden: none, one or two.
+  std::vector<HiddenEffect> effects() const {
+    std::vector<HiddenEffect> hidden;
+    for (const HiddenEffect& each : {effect, second}) {
+      if (!each.is("nothing")) {
+        hidden.push_back(each);
+      }
+    }
+    return hidden;
+  }
 };
 
 inline const char* word(CaseRange range) { return range == CaseRange::Develop ? "develop" : "report"; }
@@ -156,8 +192,14 @@ inline const char* word(CaseKind kind) {
       return "nothing";
     case CaseKind::Outside:
       return "outside";
+    case CaseKind::Two:
+      return "two";
     case CaseKind::Cylinder:
       return "cylinder";
+    case CaseKind::CylinderTwo:
+      return "cylinder_two";
+    case CaseKind::Junction:
+      return "junction";
     default:
       return "measurement";
   }
@@ -169,24 +211,35 @@ inline const std::vector<EffectEntry>& entries_of(CaseKind kind) {
   switch (kind) {
     case CaseKind::Moderate:
     case CaseKind::Weak:
+    case CaseKind::Two:
       return hidden_effects();
     case CaseKind::Outside:
       return outside_effects();
     case CaseKind::Measurement:
       return measurement_errors();
     case CaseKind::Cylinder:
+    case CaseKind::CylinderTwo:
       return cylinder_effects();
+    case CaseKind::Junction:
+      return junction_effects();
     default:
       return none;
   }
 }
 
-/// The scenarios of a range, in turn: numbers of effect_scenarios() or, for CaseKind::Cylinder, cylinder_scenarios().
+inline bool has_two(CaseKind kind) { return kind == CaseKind::Two || kind == CaseKind::CylinderTwo; }
+inline bool is_of_cylinder(CaseKind kind) { return kind == CaseKind::Cylinder || kind == CaseKind::CylinderTwo; }
+
+/// The scenarios of a range, in turn: numbers of effect_scenarios(), cylinder_scenarios() or junction_scenarios().
 inline std::vector<std::size_t> scenarios_of(CaseRange range, CaseKind kind) {
   std::vector<std::size_t> scenarios;
-  const bool moved = kind == CaseKind::Cylinder;
-  const std::size_t all = moved ? cylinder_scenarios().size() : effect_scenarios().size();
-  const std::size_t developed = moved ? cylinder_scenarios_to_develop : scenarios_to_develop;
+  const bool moved = is_of_cylinder(kind), pipes = kind == CaseKind::Junction;
+  const std::size_t all = moved   ? cylinder_scenarios().size()
+                          : pipes ? junction_scenarios().size()
+                                  : effect_scenarios().size();
+  const std::size_t developed = moved   ? cylinder_scenarios_to_develop
+                                : pipes ? junction_scenarios_to_develop
+                                        : scenarios_to_develop;
   const std::size_t end = range == CaseRange::Develop ? developed : all;
   for (std::size_t k = range == CaseRange::Develop ? 0 : developed; k < end; ++k) {
     scenarios.push_back(k);
@@ -234,7 +287,7 @@ inline HiddenEffect draw_effect(const EffectEntry& of, double factor, int turn, 
   };
   if (effect.is("lateral_force")) {
     take_turns({"steady", "window"});
-  } else if (effect.is("obstacle")) {
+  } else if (effect.is("obstacle") && effect.unit == "mm") {
     take_turns({"mouth", "mouth", "pan"});
   } else if (effect.is("inflow")) {
     take_turns({"above the pan", "in the pan"});
@@ -261,7 +314,8 @@ inline HiddenEffect draw_effect(const EffectEntry& of, double factor, int turn, 
 }  // namespace detail
 
 /// Case `number` >= 0 of a kind. Effects come in turn, and each effect comes in the range's scenarios in turn
-/// (back_pressure in those with a neck); all else is drawn from a seed that no other case has.
+/// (back_pressure in those with a neck); a second effect is one of the others, in turn as well, and of another family.
+/// All else is drawn from a seed that no other case has.
 inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
   decant::expects(number >= 0, "effect_case: number", ">= 0", number);
   EffectCase hidden;
@@ -277,7 +331,15 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
     const std::size_t which = place % entries.size(), turn = place / entries.size();
     const EffectEntry& entry = entries[which];
     hidden.effect = detail::draw_effect(entry, kind == CaseKind::Weak ? 0.5 : 1.0, static_cast<int>(turn), hidden.seed);
-    if (hidden.effect.is("back_pressure")) {
+    if (has_two(kind)) {
+      std::size_t other = which + 1 + turn % (entries.size() - 1);
+      while (std::string(entries[other % entries.size()].family) == entry.family) {
+        ++other;
+      }
+      hidden.second = detail::draw_effect(entries[other % entries.size()], 1, static_cast<int>(turn),
+                                          detail::mixed_seed({hidden.seed, 2U}));
+    }
+    if (hidden.effect.is("back_pressure") || hidden.second.is("back_pressure")) {
       std::erase_if(scenarios, [](std::size_t scenario) {
         return !effect_container(effect_scenarios()[scenario].pours[0].container).neck;
       });
@@ -293,7 +355,8 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
 inline int usual_cases(CaseRange range, CaseKind kind) {
   const auto scenarios = static_cast<int>(scenarios_of(range, kind).size());
   const auto effects = static_cast<int>(entries_of(kind).size());
-  return kind == CaseKind::Nothing ? 4 * scenarios : effects * scenarios;
+  const int turns = kind == CaseKind::Junction ? 2 : 1;
+  return kind == CaseKind::Nothing ? 4 * scenarios : turns * effects * scenarios;
 }
 
 /// By the words of a command line.
@@ -302,10 +365,15 @@ inline const std::map<std::string, CaseRange>& case_ranges() {
   return ranges;
 }
 inline const std::map<std::string, CaseKind>& case_kinds() {
-  static const std::map<std::string, CaseKind> kinds{
-      {"moderate", CaseKind::Moderate},       {"weak", CaseKind::Weak},
-      {"nothing", CaseKind::Nothing},         {"outside", CaseKind::Outside},
-      {"measurement", CaseKind::Measurement}, {"cylinder", CaseKind::Cylinder}};
+  static const std::map<std::string, CaseKind> kinds{{"moderate", CaseKind::Moderate},
+                                                     {"weak", CaseKind::Weak},
+                                                     {"nothing", CaseKind::Nothing},
+                                                     {"outside", CaseKind::Outside},
+                                                     {"measurement", CaseKind::Measurement},
+                                                     {"cylinder", CaseKind::Cylinder},
+                                                     {"two", CaseKind::Two},
+                                                     {"cylinder_two", CaseKind::CylinderTwo},
+                                                     {"junction", CaseKind::Junction}};
   return kinds;
 }
 

@@ -4,6 +4,7 @@
 /// The scores of the experiment with hidden effects, for terminals, scripts and browsers.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <map>
@@ -26,6 +27,7 @@ namespace example {
 enum class AnswerScore {
   Right,    ///< what is hidden is named, or rightly nothing; an error of measurement may be taken account of unnamed
   Wrong,    ///< something is named that is not there
+  Half,     ///< one of two that are hidden is named, and nothing else
   OneOf,    ///< what is hidden is among those that are not told apart
   Missed,   ///< nothing is said to be missing
   Abstains  ///< there is a gap that nothing explains: right where something outside of the catalogue is hidden
@@ -55,7 +57,16 @@ struct EffectScore {
   const nlohmann::json* result;
 
   std::string verdict() const { return result->at("verdict"); }
-  std::string truth() const { return result->at("truth").at("family"); }
+  /// Families of what is hidden, "nothing" among them.
+  std::set<std::string> truths() const {
+    const nlohmann::json& truth = result->at("truth");
+    std::set<std::string> names{truth.at("family")};
+    if (truth.contains("second")) {
+      names.insert(truth.at("second").at("family"));
+    }
+    return names;
+  }
+  std::string truth() const { return joined(truths(), " + "); }
   std::string role() const { return result->at("truth").at("role"); }
   /// Families of what is answered, each once.
   std::set<std::string> families() const {
@@ -70,12 +81,7 @@ struct EffectScore {
     if (verdict() == "nothing" || verdict() == "unexplained") {
       return verdict();
     }
-    std::string text;
-    for (const std::string& family : families()) {
-      text += text.empty() ? "" : verdict() == "one_of" ? " or " : " + ";
-      text += family;
-    }
-    return text;
+    return joined(families(), verdict() == "one_of" ? " or " : " + ");
   }
   /// Whether physics is blamed: something is named that is no error of measurement.
   bool blames_physics() const {
@@ -92,11 +98,18 @@ struct EffectScore {
     if (verdict() == "nothing") {
       return role() == "nothing" || role() == "measurement" ? AnswerScore::Right : AnswerScore::Missed;
     }
-    if (!names.contains(truth())) {
-      return AnswerScore::Wrong;
+    const std::set<std::string> hidden = truths();
+    if (verdict() == "one_of") {
+      const bool among =
+          std::any_of(hidden.begin(), hidden.end(), [&](const auto& each) { return names.contains(each); });
+      return among ? AnswerScore::OneOf : AnswerScore::Wrong;
     }
-    return verdict() == "one_of" ? AnswerScore::OneOf : names.size() == 1 ? AnswerScore::Right : AnswerScore::Wrong;
+    return names == hidden                                                           ? AnswerScore::Right
+           : std::includes(hidden.begin(), hidden.end(), names.begin(), names.end()) ? AnswerScore::Half
+                                                                                     : AnswerScore::Wrong;
   }
+  /// Whether more is left than where nothing is missing.
+  bool leaves_a_gap() const { return gap("after") > gap("largest_by_chance"); }
 
   /// The strength that is found over the hidden one, where the very effect is named and has one number; else NaN.
   double strength_ratio() const {
@@ -121,6 +134,15 @@ struct EffectScore {
   }
 
  private:
+  static std::string joined(const std::set<std::string>& names, const char* between) {
+    std::string text;
+    for (const std::string& name : names) {
+      text += text.empty() ? "" : between;
+      text += name;
+    }
+    return text;
+  }
+
   /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own. A wall acts on a layer of
   /// particles the stronger the thinner that is, see spacing_of_strengths.
   double strength_in_model() const {
@@ -132,7 +154,8 @@ struct EffectScore {
            : name == "fill"          ? 1 + strength
            : name == "wall_friction" ? layers * strength
            : name == "wall_adhesion" ? layers * layers * strength
-           : name == "obstacle"      ? 1e-3 * strength
+           : name == "inlet_flow"    ? 1 - strength
+           : name == "obstacle"      ? (truth.at("unit") == "mm" ? 1e-3 : 1.0) * strength
                                      : strength;
   }
 };
@@ -155,19 +178,18 @@ inline std::string share_interval(std::size_t count, std::size_t of) {
 }
 
 inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores) {
-  ExperimentSection section{"Answers", decant::Table({"hidden", "cases", "right", "right [%]", "95 % of that [%]",
-                                                      "wrong", "one of", "missed", "unexplained", "physics blamed"})};
+  ExperimentSection section{
+      "Answers", decant::Table({"hidden", "cases", "right", "right [%]", "95 % of that [%]", "wrong", "one of two",
+                                "one of", "missed", "unexplained", "physics blamed"})};
   std::vector<std::string> kinds;
   for (const EffectScore& each : scores) {
     if (std::find(kinds.begin(), kinds.end(), each.of->kind) == kinds.end()) {
       kinds.push_back(each.of->kind);
     }
   }
-  const std::vector<std::pair<std::string, AnswerScore>> shown{{"right", AnswerScore::Right},
-                                                               {"one of several", AnswerScore::OneOf},
-                                                               {"unexplained", AnswerScore::Abstains},
-                                                               {"missed", AnswerScore::Missed},
-                                                               {"wrong", AnswerScore::Wrong}};
+  const std::vector<std::pair<std::string, AnswerScore>> shown{
+      {"right", AnswerScore::Right},          {"one of two", AnswerScore::Half}, {"one of several", AnswerScore::OneOf},
+      {"unexplained", AnswerScore::Abstains}, {"missed", AnswerScore::Missed},   {"wrong", AnswerScore::Wrong}};
   section.bars = decant::BarChart{"Answers by what is hidden", "", "of the cases [%]", kinds, {}, {100}};
   for (const auto& [name, score] : shown) {
     section.bars->bars.push_back({name, {}});
@@ -190,11 +212,12 @@ inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores)
     section.table.add({kind, std::to_string(all), text(AnswerScore::Right),
                        percent_text(static_cast<double>(count[AnswerScore::Right]) / static_cast<double>(all), 0),
                        share_interval(count[AnswerScore::Right], all), text(AnswerScore::Wrong),
-                       text(AnswerScore::OneOf), text(AnswerScore::Missed), text(AnswerScore::Abstains),
-                       std::to_string(physics)});
+                       text(AnswerScore::Half), text(AnswerScore::OneOf), text(AnswerScore::Missed),
+                       text(AnswerScore::Abstains), std::to_string(physics)});
     section.json[kind] = {{"cases", all},
                           {"right", count[AnswerScore::Right]},
                           {"wrong", count[AnswerScore::Wrong]},
+                          {"one_of_two", count[AnswerScore::Half]},
                           {"one_of", count[AnswerScore::OneOf]},
                           {"missed", count[AnswerScore::Missed]},
                           {"unexplained", count[AnswerScore::Abstains]},
@@ -271,6 +294,31 @@ inline ExperimentSection strengths_and_held_out(const std::vector<EffectScore>& 
   return section;
 }
 
+/// Of cases in which two effects are hidden, what becomes of the second one.
+inline ExperimentSection two_at_once(const std::vector<EffectScore>& scores) {
+  ExperimentSection section{"Two effects at once", decant::Table({"answer", "cases", "of them"})};
+  std::size_t all = 0, both = 0, told = 0, silent = 0, unexplained = 0;
+  for (const EffectScore& each : scores) {
+    if (each.role() == "two") {
+      ++all;
+      both += each.score() == AnswerScore::Right ? 1 : 0;
+      told += each.score() == AnswerScore::Half && each.leaves_a_gap() ? 1 : 0;
+      silent += each.score() == AnswerScore::Half && !each.leaves_a_gap() ? 1 : 0;
+      unexplained += each.score() == AnswerScore::Abstains ? 1 : 0;
+    }
+  }
+  const auto add = [&](const char* answer, std::size_t count) {
+    section.table.add({answer, std::to_string(count), std::to_string(all)});
+  };
+  add("both named", both);
+  add("one named, and that more is left than where nothing is missing", told);
+  add("one named, and what is left taken for noise", silent);
+  add("unexplained", unexplained);
+  section.json = {
+      {"cases", all}, {"both", both}, {"one_and_rest_told", told}, {"one", silent}, {"unexplained", unexplained}};
+  return section;
+}
+
 /// Where what no catalogue has begins to be seen, and where it is said to. What is everywhere at once begins nowhere.
 inline ExperimentSection beginnings(const std::vector<EffectScore>& scores) {
   using decant::detail::fixed_text;
@@ -302,6 +350,51 @@ inline ExperimentSection beginnings(const std::vector<EffectScore>& scores) {
   return section;
 }
 
+/// Whether effects that answers name or leave open are hidden as often as they are said to be. Effects of a family are
+/// one; an answer that nothing is missing or that a gap is unexplained says nothing of this kind.
+inline ExperimentSection calibration(const std::vector<EffectScore>& scores) {
+  constexpr std::array<double, 6> edges{0, 0.1, 0.5, 0.75, 0.9, 1};
+  constexpr std::size_t bins = edges.size() - 1;
+  std::array<double, bins> stated{}, true_ones{}, count{};
+  double statements = 0;
+  for (const EffectScore& each : scores) {
+    if ((each.verdict() != "named" && each.verdict() != "one_of") || !each.result->contains("refined")) {
+      continue;
+    }
+    std::map<std::string, double> said;
+    for (const nlohmann::json& found : each.result->at("refined")) {
+      said[family_of(found.at("effect"))] += number_at(found, "/probability");
+    }
+    for (const auto& [family, probability] : said) {
+      if (!(probability > 0.01)) {
+        continue;  // as good as certain, and as many as one likes
+      }
+      const auto above = std::upper_bound(edges.begin() + 1, edges.end() - 1, probability);
+      const auto bin = static_cast<std::size_t>(above - edges.begin()) - 1;
+      stated[bin] += probability;
+      true_ones[bin] += each.truths().contains(family) ? 1 : 0;
+      ++count[bin];
+      ++statements;
+    }
+  }
+  ExperimentSection section{"Stated probabilities that an effect is the hidden one",
+                            decant::Table({"stated [%]", "statements", "mean of stated [%]", "true [%]"})};
+  double off = 0;
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    off += std::abs(stated[bin] - true_ones[bin]);
+    section.table.add({percent_text(edges[bin], 0) + " .. " + percent_text(edges[bin + 1], 0),
+                       decant::detail::fixed_text(count[bin], 0), percent_text(stated[bin] / count[bin]),
+                       percent_text(true_ones[bin] / count[bin])});
+    section.json["bins"].push_back({{"from", edges[bin]},
+                                    {"statements", count[bin]},
+                                    {"stated", number_json(stated[bin] / count[bin])},
+                                    {"true", number_json(true_ones[bin] / count[bin])}});
+  }
+  section.json["expected_calibration_error"] = number_json(off / statements);
+  section.note = "Expected calibration error: " + percent_text(off / statements) + " % (Naeini et al. 2015).";
+  return section;
+}
+
 inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
   using decant::detail::fixed_text;
   ExperimentSection section{
@@ -314,6 +407,10 @@ inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
     if (truth.contains("variant")) {
       hidden += ", ";
       hidden += truth.at("variant").get<std::string>();
+    }
+    if (truth.contains("second")) {
+      hidden += " + ";
+      hidden += truth.at("second").at("effect").get<std::string>();
     }
     std::string found = result.contains("strength") ? result.at("strength").dump() : "";
     std::string interval = result.contains("interval_90") ? result.at("interval_90").dump() : "";
@@ -338,6 +435,10 @@ inline std::vector<ExperimentSection> effect_tables(const EffectExperiment& expe
   if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "outside"; })) {
     sections.push_back(detail::beginnings(scores));
   }
+  if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "two"; })) {
+    sections.push_back(detail::two_at_once(scores));
+  }
+  sections.push_back(detail::calibration(scores));
   sections.push_back(detail::all_cases(scores));
   return sections;
 }

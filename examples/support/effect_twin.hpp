@@ -93,40 +93,20 @@ struct EffectRealityParts : RealityParts<PressureSolverType> {
 inline constexpr double spacing_of_strengths = 0.005;
 
 /// Of a reality with what is hidden and what is tolerated.
-inline decant::SimulatorSettings effect_reality_settings(const HiddenEffect& effect, const ToleratedErrors& errors,
-                                                         double spacing) {
+inline decant::SimulatorSettings effect_reality_settings(const std::vector<HiddenEffect>& effects,
+                                                         const ToleratedErrors& errors, double spacing) {
   decant::SimulatorSettings settings;
   settings.spacing = spacing;
   settings.threads = {1};
-  settings.gravity *= 1 + (effect.is("gravity") ? effect.strength : 0);
+  settings.gravity *= 1 + strength_of(effects, "gravity");
   settings.gravity += errors.pull;
-  settings.liquid.dynamic_viscosity += effect.is("viscosity") ? effect.strength * settings.liquid.density : 0;
-  settings.liquid.surface_tension = effect.is("surface_tension") ? effect.strength : 0;
+  settings.liquid.dynamic_viscosity += strength_of(effects, "viscosity") * settings.liquid.density;
+  settings.liquid.surface_tension = strength_of(effects, "surface_tension");
   // between those that are handed in and for_tracking's
   settings.courant_number = 1;
   settings.stability_number = 0.35;
   settings.tolerance_factor = 1.5;
   return settings;
-}
-
-/// Gives a reality the forces of what is hidden under which liquid comes to rest before the recording begins.
-template <class Model>
-void set_lasting_forces(const HiddenEffect& effect, Model& model) {
-  using namespace decant;
-  const auto strength_if = [&](const char* name) { return effect.is(name) ? effect.strength : 0; };
-  const double layers = spacing_of_strengths / model.spacing();
-  if (effect.is("shear_thinning")) {  // other than catalogues have it
-    ShearThinningViscosity<float>& friction = model.template force<ShearThinningViscosity<float>>();
-    friction.high_shear_viscosity = friction.kinematic_viscosity;
-    friction.kinematic_viscosity += static_cast<float>(effect.strength);
-    friction.relaxation_time = 0.05F;
-    friction.exponent = 0.45F;
-  }
-  model.template force<LinearDrag<float>>().rate = static_cast<float>(strength_if("drag_linear"));
-  model.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength_if("drag_quadratic"));
-  model.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength_if("wall_friction"));
-  model.template force<WallAdhesion<float>>().strength =
-      static_cast<float>(layers * layers * strength_if("wall_adhesion"));
 }
 
 /// Pulls a reality's liquid sideways, from now on or, in the variant "window", for a while.
@@ -140,36 +120,57 @@ void pull_sideways(const HiddenEffect& effect, Model& model) {
   }
 }
 
+/// Gives a reality the forces of what is hidden under which liquid comes to rest before the recording begins.
+template <class Model>
+void set_lasting_forces(const std::vector<HiddenEffect>& effects, Model& model) {
+  using namespace decant;
+  const auto strength = [&](const char* name) { return strength_of(effects, name); };
+  const double layers = spacing_of_strengths / model.spacing();
+  if (strength("shear_thinning") > 0) {  // other than catalogues have it
+    ShearThinningViscosity<float>& friction = model.template force<ShearThinningViscosity<float>>();
+    friction.high_shear_viscosity = friction.kinematic_viscosity;
+    friction.kinematic_viscosity += static_cast<float>(strength("shear_thinning"));
+    friction.relaxation_time = 0.05F;
+    friction.exponent = 0.45F;
+  }
+  model.template force<LinearDrag<float>>().rate = static_cast<float>(strength("drag_linear"));
+  model.template force<QuadraticDrag<float>>().drag = static_cast<float>(strength("drag_quadratic"));
+  model.template force<WallFriction<float>>().rate = static_cast<float>(layers * strength("wall_friction"));
+  model.template force<WallAdhesion<float>>().strength =
+      static_cast<float>(layers * layers * strength("wall_adhesion"));
+  for (const HiddenEffect& each : effects) {
+    if (each.is("lateral_force", "steady")) {
+      pull_sideways(each, model);
+    }
+  }
+}
+
 /// What really happens in one pour of a case.
 template <class PressureSolverType>
 class EffectReality {
  public:
   using Model = decant::Simulator<EffectRealityParts<PressureSolverType>>;
 
-  /// @param effect that of the case, or nothing. @param recorded_volume what the recording will say [m^3].
-  EffectReality(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which, double recorded_volume,
-                double spacing)
-      : effect_(effect),
+  /// @param effects those of the case, or none. @param recorded_volume what the recording will say [m^3].
+  EffectReality(const EffectCase& hidden, const std::vector<HiddenEffect>& effects, std::size_t which,
+                double recorded_volume, double spacing)
+      : effects_(effects),
         scenario_(effect_scenarios().at(hidden.scenario)),
         container_(effect_container(scenario_.pours.at(which).container)),
         errors_(tolerated_errors(hidden, which)),
         container_motion_(true_container_motion(RecordedMotion(hidden.scenario, which))),
         pan_motion_(true_pan_motion()),
-        model_(effect_reality_settings(effect, errors_, spacing)) {
+        model_(effect_reality_settings(effects, errors_, spacing)) {
     using namespace decant;
     container_body_ = model_.add_body("container", container_.shape, PoseTrack(container_motion_.at(0)));
     pan_body_ = model_.add_body("pan", scenario_.pan.shape(), pan_motion_);
-    set_lasting_forces(effect_, model_);
-    if (effect_.is("lateral_force", "steady")) {
-      pull_sideways(effect_, model_);
-      description_["direction"] = vector_json(effect_.level_direction());
-    }
-    const double amount = (1 + errors_.fill) * (1 + (effect_.is("fill") ? effect_.strength : 0));
+    set_lasting_forces(effects_, model_);
+    const double amount = (1 + errors_.fill) * (1 + strength_of(effects_, "fill"));
     if constexpr (std::is_same_v<PressureSolverType, Dfsph<float>>) {
       initial_volume_ = fill(model_, container_body_, FillAmount::volume(amount * recorded_volume)).volume;
     } else {
       // others start badly from liquid that was packed, and what one takes for settled is not at rest for another
-      const EffectReality<Dfsph<float>> settled(hidden, effect, which, recorded_volume, spacing);
+      const EffectReality<Dfsph<float>> settled(hidden, effects, which, recorded_volume, spacing);
       initial_volume_ = settled.initial_volume();
       Model calming = model_;
       calming.add_particles(settled.model().fluid().position, settled.model().fluid().velocity, container_body_);
@@ -179,16 +180,19 @@ class EffectReality {
     model_.watch_contents(container_body_);
     model_.watch_contents(pan_body_);
     model_.set_motion(container_body_, container_motion_);
-    set_passing_forces();
-    add_sources_and_bodies();
+    for (const HiddenEffect& each : effects_) {
+      descriptions_.push_back(nlohmann::json::object());
+      set_passing_force(each);
+      add_source_or_body(each);
+    }
   }
 
   const Model& model() const { return model_; }
   const ToleratedErrors& errors() const { return errors_; }
   double initial_volume() const { return initial_volume_; }  ///< [m^3]
   double removed() const { return removed_; }                ///< by a leak or a loss [m^3]
-  /// Where the effect is, what it does and when.
-  const nlohmann::json& description() const { return description_; }
+  /// Of each effect, where it is, what it does and when.
+  const std::vector<nlohmann::json>& descriptions() const { return descriptions_; }
 
   /// Goes on to a time [s]. Throws std::runtime_error where it cannot.
   decant::StepReport advance(double time) {
@@ -211,7 +215,7 @@ class EffectReality {
   static constexpr double samples_per_second = 200;
 
   decant::PoseTrack true_container_motion(const RecordedMotion& recorded) const {
-    const double late = errors_.latency + (effect_.is("latency") ? effect_.strength : 0);
+    const double late = errors_.latency + strength_of(effects_, "latency");
     std::vector<decant::PoseTrack::Sample> samples;
     const int count = static_cast<int>(std::ceil((recorded.plan().duration + 0.1) * samples_per_second));
     for (int k = 0; k <= count; ++k) {
@@ -219,8 +223,10 @@ class EffectReality {
       decant::Pose pose = recorded.smooth(time + late);  // what is recorded at t happened at t - late
       pose.rotation = errors_.container_error.rotation * pose.rotation;
       pose.translation += errors_.container_error.translation;
-      if (effect_.is("body_pose", "container")) {
-        pose.translation += 1e-3 * effect_.strength * effect_.direction;
+      for (const HiddenEffect& each : effects_) {
+        if (each.is("body_pose", "container")) {
+          pose.translation += 1e-3 * each.strength * each.direction;
+        }
       }
       samples.push_back({time, pose});
     }
@@ -230,138 +236,144 @@ class EffectReality {
   decant::PoseTrack true_pan_motion() const {
     decant::Pose pose;
     pose.translation = errors_.pan_offset;
-    if (effect_.is("body_pose", "pan")) {
-      pose.translation += 1e-3 * effect_.strength * effect_.level_direction();
+    const HiddenEffect* slides = nullptr;
+    for (const HiddenEffect& each : effects_) {
+      if (each.is("body_pose", "pan")) {
+        pose.translation += 1e-3 * each.strength * each.level_direction();
+      }
+      slides = each.is("sliding_pan") ? &each : slides;
     }
-    if (!effect_.is("sliding_pan")) {
+    if (slides == nullptr) {
       return decant::PoseTrack(pose);
     }
     decant::Pose there = pose;
-    there.translation += 1e-3 * effect_.strength * effect_.level_direction();
-    return decant::PoseTrack({{effect_.onset, pose}, {effect_.until, there}});
+    there.translation += 1e-3 * slides->strength * slides->level_direction();
+    return decant::PoseTrack({{slides->onset, pose}, {slides->until, there}});
   }
 
-  void set_passing_forces() {
+  void set_passing_force(const HiddenEffect& effect) {
     using namespace decant;
-    if (effect_.is("lateral_force", "window")) {
-      pull_sideways(effect_, model_);
-      description_["direction"] = vector_json(effect_.level_direction());
-      say_window();
-    } else if (effect_.is("suction")) {
+    if (effect.is("lateral_force")) {
+      descriptions_.back()["direction"] = vector_json(effect.level_direction());
+      if (effect.variant == "window") {
+        pull_sideways(effect, model_);
+        say_window(effect);
+      }
+    } else if (effect.is("suction")) {
       // beside the jet, so that it is drawn aside and not caught
       const Vector3<double> point =
-          scenario_.jet(0.55) + 0.045 * effect_.side * scenario_.across() + 0.008 * effect_.displacement;
+          scenario_.jet(0.55) + 0.045 * effect.side * scenario_.across() + 0.008 * effect.displacement;
       Suction<float>& suction = model_.template force<Suction<float>>();
-      suction.strength = static_cast<float>(effect_.strength);
+      suction.strength = static_cast<float>(effect.strength);
       suction.point = point.cast<float>();
       say("world", point);
-    } else if (effect_.is("back_pressure")) {
+    } else if (effect.is("back_pressure")) {
       BackPressure& air = model_.template force<BackPressure>();
-      air.strength = effect_.strength;
-      air.frequency = effect_.frequency;
-      air.onset = effect_.onset - 0.3;
+      air.strength = effect.strength;
+      air.frequency = effect.frequency;
+      air.onset = effect.onset - 0.3;
       air.mouth = {0, 0, container_.lip.z()};
       air.radius = container_.lip.x() + 0.002;
       air.container = container_motion_;
       say("container", air.mouth);
-      description_["reach_m"] = air.reach;
-      description_["frequency_hz"] = air.frequency;
-      description_["onset_s"] = air.onset;
-    } else if (effect_.is("stirrer")) {
+      descriptions_.back()["reach_m"] = air.reach;
+      descriptions_.back()["frequency_hz"] = air.frequency;
+      descriptions_.back()["onset_s"] = air.onset;
+    } else if (effect.is("stirrer")) {
       Stirrer& stirrer = model_.template force<Stirrer>();
-      stirrer.speed = effect_.side * effect_.strength;
-      stirrer.onset = effect_.onset;
-      stirrer.foot = scenario_.pan.floor_below(0.015 * effect_.displacement);
+      stirrer.speed = effect.side * effect.strength;
+      stirrer.onset = effect.onset;
+      stirrer.foot = scenario_.pan.floor_below(0.015 * effect.displacement);
       say("pan", stirrer.foot);
-      description_["onset_s"] = effect_.onset;
-    } else if (effect_.is("sticky_patch")) {
+      descriptions_.back()["onset_s"] = effect.onset;
+    } else if (effect.is("sticky_patch")) {
       StickyPatch& patch = model_.template force<StickyPatch>();
-      patch.rate = spacing_of_strengths / model_.spacing() * effect_.strength;
+      patch.rate = spacing_of_strengths / model_.spacing() * effect.strength;
       patch.body = container_body_;
-      patch.side = effect_.side * Vector3<double>::UnitY();
+      patch.side = effect.side * Vector3<double>::UnitY();
       patch.motion = container_motion_;
       say("container", {0, 0, 0});
-      description_["direction"] = vector_json(patch.side);
-    } else if (effect_.is("puff")) {
+      descriptions_.back()["direction"] = vector_json(patch.side);
+    } else if (effect.is("puff")) {
       Puff& puff = model_.template force<Puff>();
-      puff.strength = effect_.strength;
-      puff.from = effect_.onset;
-      puff.until = effect_.until;
-      puff.foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.015 * effect_.displacement);
+      puff.strength = effect.strength;
+      puff.from = effect.onset;
+      puff.until = effect.until;
+      puff.foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.015 * effect.displacement);
       say("pan", puff.foot);
-      say_window();
-    } else if (effect_.is("shaking_table")) {
+      say_window(effect);
+    } else if (effect.is("shaking_table")) {
       ShakingTable& table = model_.template force<ShakingTable>();
-      table.size = effect_.strength * effect_.level_direction();
-      table.frequency = effect_.frequency;
-      table.from = effect_.onset - 0.4;
+      table.size = effect.strength * effect.level_direction();
+      table.frequency = effect.frequency;
+      table.from = effect.onset - 0.4;
       say("world", {0, 0, 0});
-      description_["direction"] = vector_json(effect_.level_direction());
-      description_["frequency_hz"] = table.frequency;
-      description_["onset_s"] = table.from;
-    } else if (effect_.is("sliding_pan")) {
+      descriptions_.back()["direction"] = vector_json(effect.level_direction());
+      descriptions_.back()["frequency_hz"] = table.frequency;
+      descriptions_.back()["onset_s"] = table.from;
+    } else if (effect.is("sliding_pan")) {
       say("pan", {0, 0, 0});
-      description_["direction"] = vector_json(effect_.level_direction());
-      say_window();
-    } else if (effect_.is("body_pose")) {
-      const bool pan = effect_.variant == "pan";
+      descriptions_.back()["direction"] = vector_json(effect.level_direction());
+      say_window(effect);
+    } else if (effect.is("body_pose")) {
+      const bool pan = effect.variant == "pan";
       say(pan ? "pan" : "container", {0, 0, 0});
-      description_["direction"] = vector_json(pan ? effect_.level_direction() : effect_.direction);
+      descriptions_.back()["direction"] = vector_json(pan ? effect.level_direction() : effect.direction);
     }
   }
 
-  void add_sources_and_bodies() {
+  void add_source_or_body(const HiddenEffect& effect) {
     using namespace decant;
-    if (effect_.is("leak")) {
+    if (effect.is("leak")) {
       // where the liquid is while it is poured: in the wall below the lip
-      const Vector3<double> hole = container_.wall_below_lip(0.35 + 0.15 * effect_.displacement.x());
+      const Vector3<double> hole = container_.wall_below_lip(0.35 + 0.15 * effect.displacement.x());
       OutletSettings outlet;
       outlet.body = container_body_;
       outlet.position = hole;
       outlet.radius = 0.012;
       outlet.exit = hole + Vector3<double>(0.012, 0, 0);  // it runs on outside
-      outlet.flow = {{0, 1e-6 * effect_.strength}, {60, 1e-6 * effect_.strength}};
+      outlet.flow = {{0, 1e-6 * effect.strength}, {60, 1e-6 * effect.strength}};
       model_.add_outlet(outlet);
       say("container", hole);
-    } else if (effect_.is("loss")) {
+    } else if (effect.is("loss")) {
       // a cloth on the floor, which soaks up what is above it
       OutletSettings cloth;
       cloth.body = pan_body_;
-      cloth.position = scenario_.pan.floor_below(0.02 * effect_.displacement);
+      cloth.position = scenario_.pan.floor_below(0.02 * effect.displacement);
       cloth.radius = 0.6 * scenario_.pan.radius;
       cloth.order = OutletOrder::Evenly;
-      cloth.flow = {{0, 1e-6 * effect_.strength}, {60, 1e-6 * effect_.strength}};
+      cloth.flow = {{0, 1e-6 * effect.strength}, {60, 1e-6 * effect.strength}};
       model_.add_outlet(cloth);
       say("pan", cloth.position);
-    } else if (effect_.is("inflow")) {
+    } else if (effect.is("inflow")) {
       InletSettings inlet;
-      const bool above = effect_.variant == "above the pan";
-      inlet.position = scenario_.pan.floor_below(0.35 * scenario_.pan.radius * effect_.side * scenario_.across() +
-                                                 0.015 * effect_.displacement);
-      inlet.position.z() += above ? 0.10 + 0.02 * effect_.displacement.z() : 0.03;
+      const bool above = effect.variant == "above the pan";
+      inlet.position = scenario_.pan.floor_below(0.35 * scenario_.pan.radius * effect.side * scenario_.across() +
+                                                 0.015 * effect.displacement);
+      inlet.position.z() += above ? 0.10 + 0.02 * effect.displacement.z() : 0.03;
       inlet.radius = 0.006;
-      const double flow = 1e-6 * effect_.strength;
-      inlet.flow = {{effect_.onset, flow}, {effect_.onset + 60, flow}};
+      const double flow = 1e-6 * effect.strength;
+      inlet.flow = {{effect.onset, flow}, {effect.onset + 60, flow}};
       model_.add_inlet(inlet, foreign_liquid);
       say("world", inlet.position);
-      description_["radius_m"] = inlet.radius;
-      description_["direction"] = vector_json(inlet.direction);
-      description_["onset_s"] = effect_.onset;
-    } else if (effect_.is("obstacle", "mouth")) {
+      descriptions_.back()["radius_m"] = inlet.radius;
+      descriptions_.back()["direction"] = vector_json(inlet.direction);
+      descriptions_.back()["onset_s"] = effect.onset;
+    } else if (effect.is("obstacle", "mouth")) {
       // a block on the inside of the wall, as high as it is wide, that ends level with the lip
-      const double edge = 1e-3 * effect_.strength;
+      const double edge = 1e-3 * effect.strength;
       const Vector3<double> corner(container_.lip.x(), 0.5 * edge, container_.lip.z());
       add_block("container", corner - Vector3<double>::Constant(edge), corner, container_motion_);
-    } else if (effect_.is("obstacle", "pan")) {
-      const double edge = 1e-3 * effect_.strength;
-      const Vector3<double> foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.01 * effect_.displacement);
+    } else if (effect.is("obstacle", "pan")) {
+      const double edge = 1e-3 * effect.strength;
+      const Vector3<double> foot = scenario_.pan.floor_below(scenario_.jet(0) + 0.01 * effect.displacement);
       const Vector3<double> corner = foot - 0.5 * edge * Vector3<double>(1, 1, 0);
       add_block("pan", corner, corner + Vector3<double>::Constant(edge), pan_motion_);
-    } else if (effect_.is("bump")) {
+    } else if (effect.is("bump")) {
       // the cap of a ball that sticks out of the floor, away from where the jet lands
-      const double height = 1e-3 * effect_.strength, radius = 0.032;
+      const double height = 1e-3 * effect.strength, radius = 0.032;
       const Vector3<double> foot = scenario_.pan.floor_below(
-          0.5 * scenario_.pan.radius * effect_.side * scenario_.across() + 0.005 * effect_.displacement);
+          0.5 * scenario_.pan.radius * effect.side * scenario_.across() + 0.005 * effect.displacement);
       model_.add_body("bump", Sphere{foot + Vector3<double>(0, 0, height - radius), radius}, pan_motion_);
       say("pan", foot);
     }
@@ -376,17 +388,17 @@ class EffectReality {
   static nlohmann::json vector_json(const decant::Vector3<double>& v) { return {v.x(), v.y(), v.z()}; }
   // a place in the frame of a body, or of the world
   void say(const char* where, const decant::Vector3<double>& position) {
-    description_["place"] = where;
-    description_["position_m"] = vector_json(position);
+    descriptions_.back()["place"] = where;
+    descriptions_.back()["position_m"] = vector_json(position);
   }
-  void say_window() {
-    description_["onset_s"] = effect_.onset;
-    description_["until_s"] = effect_.until;
+  void say_window(const HiddenEffect& effect) {
+    descriptions_.back()["onset_s"] = effect.onset;
+    descriptions_.back()["until_s"] = effect.until;
   }
 
   static constexpr decant::Origin foreign_liquid = 100;
 
-  HiddenEffect effect_;
+  std::vector<HiddenEffect> effects_;
   EffectScenario scenario_;
   EffectContainer container_;
   ToleratedErrors errors_;
@@ -395,50 +407,58 @@ class EffectReality {
   decant::BodyId container_body_ = 0, pan_body_ = 0;
   double initial_volume_ = 0;  ///< [m^3]
   double removed_ = 0;         ///< [m^3]
-  nlohmann::json description_ = nlohmann::json::object();
+  std::vector<nlohmann::json> descriptions_{};
 };
 
 /// The camera as it really is.
 inline std::pair<decant::PinholeCamera, decant::Pose> true_camera(const EffectScenario& scenario,
-                                                                  const HiddenEffect& effect) {
+                                                                  const std::vector<HiddenEffect>& effects) {
   const decant::PinholeCamera camera = effect_camera();
-  decant::Pose camera_from_world = effect_camera_from_world(scenario);
-  if (effect.is("camera_shift", "roll")) {
-    const Eigen::Quaterniond roll(
-        Eigen::AngleAxisd(effect.strength * std::numbers::pi / 180, Eigen::Vector3d::UnitZ()));
-    camera_from_world = decant::Pose{roll, {0, 0, 0}} * camera_from_world;
-  } else if (effect.is("camera_shift", "shift")) {
-    const decant::Vector3<double> shift = effect.strength * effect.level_direction();
-    return {decant::PinholeCamera(camera.fx(), camera.fy(), camera.cx() + shift.x(), camera.cy() + shift.y(),
-                                  camera.width(), camera.height()),
-            camera_from_world};
+  const Eigen::Quaterniond roll(Eigen::AngleAxisd(strength_of(effects, "camera_shift", "roll") * std::numbers::pi / 180,
+                                                  Eigen::Vector3d::UnitZ()));
+  decant::Vector3<double> shift(0, 0, 0);  // [px]
+  for (const HiddenEffect& each : effects) {
+    if (each.is("camera_shift", "shift")) {
+      shift += each.strength * each.level_direction();
+    }
   }
-  return {camera, camera_from_world};
+  return {decant::PinholeCamera(camera.fx(), camera.fy(), camera.cx() + shift.x(), camera.cy() + shift.y(),
+                                camera.width(), camera.height()),
+          decant::Pose{roll, {0, 0, 0}} * effect_camera_from_world(scenario)};
 }
 
 /// The truth about a recording, for scoring alone.
 template <class Reality>
-nlohmann::json effect_truth(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which,
+nlohmann::json effect_truth(const EffectCase& hidden, const std::vector<HiddenEffect>& effects, std::size_t which,
                             const Reality& reality, RealitySolver solver) {
   const auto vector = [](const decant::Vector3<double>& v) { return nlohmann::json{v.x(), v.y(), v.z()}; };
   const ToleratedErrors& errors = reality.errors();
   const Eigen::AngleAxisd turn(errors.container_error.rotation);
-  nlohmann::json truth = reality.description();
-  truth["role"] = effect.is("nothing")           ? "nothing"
-                  : effect.family == "outside"   ? "outside"
-                  : hidden.kind == "measurement" ? "measurement"
-                                                 : "catalogue";
-  truth["effect"] = effect.name;
-  truth["family"] = effect.family;
-  if (!effect.is("nothing")) {
-    truth["strength"] = effect.strength;
-    truth["unit"] = effect.unit;
-    if (!effect.variant.empty()) {
-      truth["variant"] = effect.variant;
+  const auto told = [&](std::size_t k) {
+    const HiddenEffect effect = k < effects.size() ? effects[k] : HiddenEffect{};
+    nlohmann::json json = k < effects.size() ? reality.descriptions()[k] : nlohmann::json::object();
+    json["effect"] = effect.name;
+    json["family"] = effect.family;
+    if (!effect.is("nothing")) {
+      json["strength"] = effect.strength;
+      json["unit"] = effect.unit;
+      if (!effect.variant.empty()) {
+        json["variant"] = effect.variant;
+      }
     }
-  }
-  if (effect.is("camera_shift", "shift")) {
-    truth["direction_px"] = {std::cos(effect.angle), std::sin(effect.angle)};
+    if (effect.is("camera_shift", "shift")) {
+      json["direction_px"] = {std::cos(effect.angle), std::sin(effect.angle)};
+    }
+    return json;
+  };
+  nlohmann::json truth = told(0);
+  truth["role"] = effects.empty()                       ? "nothing"
+                  : effects.size() == 2                 ? "two"
+                  : effects.front().family == "outside" ? "outside"
+                  : hidden.kind == "measurement"        ? "measurement"
+                                                        : "catalogue";
+  if (effects.size() == 2) {
+    truth["second"] = told(1);
   }
   truth["range"] = hidden.range;
   truth["kind"] = hidden.kind;
@@ -466,14 +486,14 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   using namespace decant;
   const EffectScenario& scenario = effect_scenarios().at(hidden.scenario);
   const PourPlan& plan = scenario.pours.at(which);
-  const HiddenEffect effect = settings.with_effect ? hidden.effect : HiddenEffect{};
+  const std::vector<HiddenEffect> effects = settings.with_effect ? hidden.effects() : std::vector<HiddenEffect>{};
   const BodyShape container = effect_container(plan.container).shape;
   const double recorded_volume = 1e-7 * std::round(1e7 * plan.fill * Cavity(container.mesh).volume());
-  EffectReality<PressureSolverType> reality(hidden, effect, which, recorded_volume, settings.spacing);
+  EffectReality<PressureSolverType> reality(hidden, effects, which, recorded_volume, settings.spacing);
   // the same without the effect, to know where that can be seen
   std::optional<EffectReality<PressureSolverType>> plain;
-  if (effect.family == "outside") {
-    plain.emplace(hidden, HiddenEffect{}, which, recorded_volume, settings.spacing);
+  if (!effects.empty() && effects.front().family == "outside") {
+    plain.emplace(hidden, std::vector<HiddenEffect>{}, which, recorded_volume, settings.spacing);
   }
 
   Recording header;
@@ -486,7 +506,7 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   if (settings.truth_masks) {
     std::filesystem::create_directories(folder / "truth_mask");
   }
-  const auto [camera, camera_from_world] = true_camera(scenario, effect);
+  const auto [camera, camera_from_world] = true_camera(scenario, effects);
   TwinSight sight(camera, camera_from_world, {0, 0, 0}, reality.model());
   std::optional<TwinSight> plain_sight;
   if (plain) {
@@ -519,8 +539,8 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
       plain->advance(time);
       first_sight.add(time, seen, plain_sight->look(plain->model()));
     }
-    if (effect.is("mask_bias")) {
-      seen = fattened(seen, effect.strength);
+    if (const double pixels = strength_of(effects, "mask_bias"); pixels != 0) {
+      seen = fattened(seen, pixels);
     }
     if (settings.truth_masks) {
       write_png(folder / "truth_mask" / (decant::detail::six_digits(static_cast<std::size_t>(number)) + ".png"), seen);
@@ -535,7 +555,7 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
     writer.add_frame(frame);
     progress(static_cast<double>(number + 1) / frames);
   }
-  nlohmann::json truth = effect_truth(hidden, effect, which, reality, settings.solver);
+  nlohmann::json truth = effect_truth(hidden, effects, which, reality, settings.solver);
   truth["recorded_ml"] = 1e6 * recorded_volume;
   truth["removed_ml"] = 1e6 * reality.removed();
   if (first_sight.found()) {

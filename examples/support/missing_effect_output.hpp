@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 
 #include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/missing_effect.hpp>
+#include <decant/discovery/next_interaction.hpp>
 #include <decant/io/detail/text.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/table.hpp>
@@ -165,6 +167,12 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   text += ": with it the gap falls by ";
   text += decant::detail::fixed_text(100 * result.learn.share(), 0);
   text += " % of what is reducible.";
+  const double largest = result.judgement.chance.largest_distance;
+  if (largest > 0 && result.learn.after > largest) {
+    text += " What is left is ";
+    text += decant::detail::fixed_text(result.learn.after / largest, 1);
+    text += " times the most that is left where nothing is missing.";
+  }
   if (result.told_apart_by_others) {
     text += " What was learnt from does not tell it from others; the recordings held out do.";
   }
@@ -373,6 +381,43 @@ inline decant::Table where_table(const std::vector<std::string>& recordings, con
     }
   }
   return table;
+}
+
+/// Throws std::runtime_error where a proposed interaction has another catalogue than what was learnt from: numbers of
+/// effects would mean something else there.
+inline void expect_same_effects(const std::vector<decant::Effect>& effects, const std::vector<decant::Effect>& proposed,
+                                const std::string& name) {
+  const bool same = std::equal(effects.begin(), effects.end(), proposed.begin(), proposed.end(),
+                               [](const auto& a, const auto& b) { return a.name == b.name; });
+  if (!same) {
+    throw std::runtime_error(
+        "--propose: " + name +
+        ": expected bodies of the same number, roles and kinds as in the recordings to learn from");
+  }
+}
+
+/// Which of some interactions to record next, the most telling one first.
+inline decant::Table advice_table(const std::vector<std::string>& proposed,
+                                  const std::vector<decant::InteractionAdvice>& advice) {
+  using decant::detail::fixed_text;
+  decant::Table table({"to record next", "is expected to tell [bit]", "+-", "and to settle it in [%]"});
+  for (const decant::InteractionAdvice& each : advice) {
+    table.add({proposed.at(each.which), fixed_text(each.gain, 2), fixed_text(each.deviation, 2),
+               fixed_text(100 * each.settles, 0)});
+  }
+  return table;
+}
+
+inline nlohmann::json advice_json(const std::vector<std::string>& proposed,
+                                  const std::vector<decant::InteractionAdvice>& advice) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const decant::InteractionAdvice& each : advice) {
+    json.push_back({{"recording", proposed.at(each.which)},
+                    {"gain_bit", number_json(each.gain)},
+                    {"deviation_bit", number_json(each.deviation)},
+                    {"settles", number_json(each.settles)}});
+  }
+  return json;
 }
 
 }  // namespace example

@@ -50,28 +50,28 @@ class MovedCylinder {
  public:
   using Model = decant::Simulator<EffectRealityParts<decant::Dfsph<float>>>;
 
-  /// @param effect that of the case, or nothing.
-  MovedCylinder(const EffectCase& hidden, const HiddenEffect& effect, std::size_t which, double spacing)
+  /// @param effects those of the case, or none.
+  MovedCylinder(const EffectCase& hidden, const std::vector<HiddenEffect>& effects, std::size_t which, double spacing)
       : scenario_(cylinder_scenarios().at(hidden.scenario)),
         errors_(tolerated_errors(hidden, which)),
-        model_(effect_reality_settings(effect, errors_, spacing)) {
+        model_(effect_reality_settings(effects, errors_, spacing)) {
     using namespace decant;
     const CylinderPath& path = scenario_.paths.at(which);
     body_ = model_.add_body("cylinder", moved_cylinder(scenario_), PoseTrack(path.at(0)));
-    set_lasting_forces(effect, model_);
-    if (effect.is("lateral_force", "steady")) {
-      pull_sideways(effect, model_);
-    }
-    const double amount = (1 + errors_.fill) * (1 + (effect.is("fill") ? effect.strength : 0));
+    set_lasting_forces(effects, model_);
+    const double amount = (1 + errors_.fill) * (1 + strength_of(effects, "fill"));
     initial_volume_ = fill(model_, body_, FillAmount::volume(amount * recorded_volume(scenario_))).volume;
-    model_.set_motion(body_, true_motion(path, errors_.latency + (effect.is("latency") ? effect.strength : 0)));
-    if (effect.is("lateral_force")) {
-      const Vector3<double> direction = effect.level_direction();
-      description_["direction"] = {direction.x(), direction.y(), direction.z()};
-      if (effect.variant == "window") {
-        pull_sideways(effect, model_);
-        description_["onset_s"] = effect.onset;
-        description_["until_s"] = effect.until;
+    model_.set_motion(body_, true_motion(path, errors_.latency + strength_of(effects, "latency")));
+    for (const HiddenEffect& each : effects) {
+      nlohmann::json& description = descriptions_.emplace_back(nlohmann::json::object());
+      if (each.is("lateral_force")) {
+        const Vector3<double> direction = each.level_direction();
+        description["direction"] = {direction.x(), direction.y(), direction.z()};
+        if (each.variant == "window") {
+          pull_sideways(each, model_);
+          description["onset_s"] = each.onset;
+          description["until_s"] = each.until;
+        }
       }
     }
   }
@@ -79,7 +79,7 @@ class MovedCylinder {
   const Model& model() const { return model_; }
   const ToleratedErrors& errors() const { return errors_; }
   double initial_volume() const { return initial_volume_; }  ///< [m^3]
-  const nlohmann::json& description() const { return description_; }
+  const std::vector<nlohmann::json>& descriptions() const { return descriptions_; }
 
   /// Goes on to a time [s]. Throws std::runtime_error where it cannot.
   void advance(double time) { step_reality(model_, time, time); }
@@ -109,7 +109,7 @@ class MovedCylinder {
   Model model_;
   decant::BodyId body_ = 0;
   double initial_volume_ = 0;
-  nlohmann::json description_ = nlohmann::json::object();
+  std::vector<nlohmann::json> descriptions_{};
 };
 
 inline constexpr double cylinder_frames_per_second = 60;
@@ -131,8 +131,8 @@ inline void record_moved_cylinder(
   }
   const CylinderScenario& scenario = cylinder_scenarios().at(hidden.scenario);
   const CylinderPath& path = scenario.paths.at(which);
-  const HiddenEffect effect = settings.with_effect ? hidden.effect : HiddenEffect{};
-  MovedCylinder reality(hidden, effect, which, settings.spacing);
+  const std::vector<HiddenEffect> effects = settings.with_effect ? hidden.effects() : std::vector<HiddenEffect>{};
+  MovedCylinder reality(hidden, effects, which, settings.spacing);
 
   Recording header;
   header.name = "cylinder" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
@@ -162,7 +162,7 @@ inline void record_moved_cylinder(
     measurements.channels.front().values.push_back(1e3 * wrong.value(k) + millimetres(tremble));
   }
   writer.set_measurements(std::move(measurements));
-  nlohmann::json truth = effect_truth(hidden, effect, which, reality, settings.solver);
+  nlohmann::json truth = effect_truth(hidden, effects, which, reality, settings.solver);
   truth["recorded_ml"] = 1e6 * recorded_volume(scenario);
   truth["volume_ml"] = {
       {"cylinder", std::vector<double>(static_cast<std::size_t>(frames), 1e6 * reality.initial_volume())}};

@@ -34,6 +34,7 @@
 #include <decant/io/recording_reader.hpp>
 #include <decant/simulation/simulator.hpp>
 
+#include "junction_legs.hpp"
 #include "pour_places.hpp"
 #include "recorded_sensors.hpp"
 #include "tracking_run.hpp"
@@ -51,6 +52,9 @@ struct InteractionOptions {
   /// Kinds of sensors that may show too much or too little: the same for all recordings of a search, see
   /// uncertain_gains.
   std::set<std::string> gain_of{};
+  /// Not what was seen, but what would be: each camera is there, with or without pictures, and what was seen or read is
+  /// left out.
+  bool planned = false;
 };
 
 namespace detail {
@@ -193,6 +197,25 @@ inline bool moves(const decant::Recording& recording) {
   return std::any_of(recording.bodies.begin(), recording.bodies.end(), moves_on);
 }
 
+/// What pipes may do: each way out of a junction may be blocked in part, or leak.
+inline std::vector<decant::InteractionEffect<EffectModel>> effects_of_junction(const decant::Recording& recording,
+                                                                               std::size_t body) {
+  using namespace decant;
+  std::vector<InteractionEffect<EffectModel>> effects;
+  const BoundingVolumeHierarchy surface(recording.bodies[body].mesh);
+  const Pose first = recording.bodies[body].motion.at(recording.timestamps.front());
+  const Vector3<double> down = first.rotation.conjugate() * recording.gravity.normalized();
+  for (const JunctionLeg& leg : junction_legs(recording, body)) {
+    const std::string where = leg.name + " leg of the " + recording.bodies[body].name;
+    const Vector3<double>& middle = leg.section.center;
+    effects.push_back(blockage_effect<EffectModel>(static_cast<BodyId>(body), leg.section, where));
+    const WallPlace place = wall_place(surface, middle, middle + down);
+    effects.push_back(leak_effect<EffectModel>(static_cast<BodyId>(body), place.point - 0.004 * place.out,
+                                               (place.thickness + 0.013) * place.out, where));
+  }
+  return effects;
+}
+
 /// The catalogue, as far as it applies to a recording. @param most_fill how much more liquid there may be at most, over
 /// what is assumed; nothing where that is not asked.
 inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording,
@@ -213,6 +236,12 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   std::vector<InteractionEffect<EffectModel>> of_bodies;
   for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
     const recording::Body& body = recording.bodies[k];
+    if (body.role == recording::Role::Junction) {
+      for (auto& effect : effects_of_junction(recording, k)) {
+        of_bodies.push_back(std::move(effect));
+      }
+      continue;
+    }
     const bool source = body.role == recording::Role::Source;
     if (!source && body.role != recording::Role::Target) {
       continue;
@@ -269,6 +298,9 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   }
   if (most_fill) {
     effects.push_back(fill_effect<EffectModel>(*most_fill));
+  }
+  if (recording.liquid.inlet) {
+    effects.push_back(inlet_flow_effect<EffectModel>());
   }
   effects.push_back(moves(recording) ? latency_effect<EffectModel>() : late_start_effect<EffectModel>());
   for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
@@ -345,7 +377,7 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
   std::vector<std::size_t> cameras;
   for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
     auto series = seen_by(recording, camera, frames, options.model.cell_px);
-    if (!series) {
+    if (!series && !options.planned) {
       continue;
     }
     const recording::Camera& of = recording.cameras[camera];
@@ -356,12 +388,17 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
       one.camera_from_world.push_back(of.view(frame).camera_from_world);
     }
     scene.cameras.push_back(std::move(one));
-    seen.silhouettes.push_back(std::move(*series));
+    if (!options.planned) {
+      seen.silhouettes.push_back(std::move(*series));
+    }
     cameras.push_back(camera);
   }
   std::tie(scene.sensors, seen.readings) =
       recorded_sensors<EffectModel>(recording, scene.times, places, options.reading_errors);
-  if (seen.silhouettes.empty() && seen.readings.empty()) {
+  if (options.planned) {
+    seen.readings.clear();
+  }
+  if (scene.cameras.empty() && scene.sensors.empty()) {
     throw std::runtime_error(recording.name + ": expected masks or measurements to compare a model with");
   }
   auto catalogue = catalogue_of(recording, places, most_fill);

@@ -12,6 +12,9 @@
 
 #include <Eigen/Geometry>
 
+#include <decant/boundary/bounding_volume_hierarchy.hpp>
+#include <decant/boundary/pipe_network.hpp>
+#include <decant/boundary/pipe_section.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/discovery/liquid_effects.hpp>
@@ -342,6 +345,59 @@ TEST_CASE("simulated interaction: liquid has come to rest under what pulls it al
   CHECK(nearest > 0.85 * rest);
   CHECK(farthest < 1.15 * rest);
   CHECK(thrown > 1.5 * rest);
+}
+
+TEST_CASE("simulated interaction: a pipe that is blocked in part lets less pass, and inlets bring in what is asked") {
+  PipeNetwork straight;
+  straight.radius = 0.018;
+  straight.places = {{0, 0.3}, {0, 0.1}};
+  straight.pipes = {{0, 1}};
+  const TriangleMesh pipe = straight.mesh();
+  Pour::Scene scene;
+  scene.motion = {PoseTrack(Pose{})};
+  scene.start = [pipe](SimulatorSettings settings, double) {
+    settings.threads = {1};
+    PourModel model(settings);
+    model.add_body("pipe", pipe);
+    InletSettings inlet;
+    inlet.position = {0, 0, 0.28};
+    inlet.radius = 0.012;
+    inlet.flow = {{0, 4e-4}, {0.5, 4e-4}};
+    model.add_inlet(inlet, 1);
+    return model;
+  };
+  scene.times = {0, 0.5};
+  InteractionSensor<PourModel> below;  // what has passed [m^3]
+  below.error = {1e-6, 0.1};
+  below.read = [](PourModel& model) {
+    double mass = 0;
+    for (Index i = 0; i < model.fluid().size(); ++i) {
+      mass += model.fluid().position(2, i) < 0.15F ? static_cast<double>(model.fluid().mass[i]) : 0.0;
+    }
+    return mass / model.settings().liquid.density;
+  };
+  scene.sensors = {below};
+  const auto section =
+      pipe_section(BoundingVolumeHierarchy(pipe), Vector3<double>(0, 0, 0.2), Vector3<double>(0, 0, -1), 0.05);
+  REQUIRE(section);
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.007;
+  settings.jitter = 0;
+  const Pour piped(std::move(scene), {blockage_effect<PourModel>(0, *section, "pipe"), inlet_flow_effect<PourModel>()},
+                   settings);
+  const auto passed = [&](const char* effect, double strength) {
+    return piped.predict(run_with(piped, effect, {strength})).readings[0].value(1);
+  };
+  const double open = piped.predict({{}, 1, false}).readings[0].value(1);
+  REQUIRE(open > 5e-5);
+  CHECK(passed("obstacle", 0.01) == Approx(open).epsilon(0.02));
+  CHECK(passed("obstacle", 0.7) < 0.6 * open);
+  CHECK(passed("obstacle", 0.95) < 0.5 * passed("obstacle", 0.7));
+  CHECK(passed("inlet_flow", 0.6) < 0.75 * open);
+  // it is the inlet's own flow that changes
+  PourModel model = piped.started(run_with(piped, "inlet_flow", {0.6}));
+  REQUIRE(model.inlet_count() == 1);
+  CHECK(model.inlet(0).flow(0.2) == Approx(0.6 * 4e-4));
 }
 
 TEST_CASE("simulated interaction: obstacles go with their body, and necks hold liquid back") {

@@ -33,8 +33,8 @@ using namespace example;
 namespace {
 
 constexpr std::array both_ranges{CaseRange::Develop, CaseRange::Report};
-constexpr std::array kinds_of_effects{CaseKind::Moderate, CaseKind::Weak, CaseKind::Outside, CaseKind::Measurement,
-                                      CaseKind::Cylinder};
+constexpr std::array kinds_of_effects{CaseKind::Moderate,    CaseKind::Weak,     CaseKind::Outside,
+                                      CaseKind::Measurement, CaseKind::Cylinder, CaseKind::Junction};
 
 /// One particle, as a force sees it.
 struct LoneParticle {
@@ -66,8 +66,8 @@ TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is
   std::size_t cases = 0;
   std::map<CaseRange, std::set<std::size_t>> scenarios;
   for (const CaseRange range : both_ranges) {
-    for (const CaseKind kind :
-         {CaseKind::Moderate, CaseKind::Weak, CaseKind::Nothing, CaseKind::Outside, CaseKind::Measurement}) {
+    for (const CaseKind kind : {CaseKind::Moderate, CaseKind::Weak, CaseKind::Nothing, CaseKind::Outside,
+                                CaseKind::Measurement, CaseKind::Two}) {
       for (int number = 0; number < 100; ++number) {
         const EffectCase one = effect_case(range, kind, number), again = effect_case(range, kind, number);
         CHECK((one.seed == again.seed && one.effect.name == again.effect.name &&
@@ -89,6 +89,8 @@ TEST_CASE("effect cases: ranges share neither scenarios nor seeds, and a case is
   const auto cylinders = [](CaseRange range) { return scenarios_of(range, CaseKind::Cylinder); };
   CHECK(cylinders(CaseRange::Develop) == std::vector<std::size_t>{0, 1});
   CHECK(cylinders(CaseRange::Report) == std::vector<std::size_t>{2, 3, 4, 5, 6});
+  CHECK(scenarios_of(CaseRange::Develop, CaseKind::Junction) == std::vector<std::size_t>{0});
+  CHECK(scenarios_of(CaseRange::Report, CaseKind::Junction) == std::vector<std::size_t>{1, 2, 3});
   CHECK(effect_case(CaseRange::Develop, CaseKind::Cylinder, 3).seed !=
         effect_case(CaseRange::Report, CaseKind::Cylinder, 3).seed);
   CHECK_THROWS_AS(effect_case(CaseRange::Develop, CaseKind::Weak, -1), std::invalid_argument);
@@ -140,6 +142,29 @@ TEST_CASE("effect cases: each effect comes equally often and in all scenarios, a
       CHECK(thinning == (physics ? rounds / 2 : 0));
     }
   }
+}
+
+TEST_CASE("effect cases: two at once are of different families, and all pairs come up") {
+  for (const CaseKind kind : {CaseKind::Two, CaseKind::CylinderTwo}) {
+    const std::vector<EffectEntry>& entries = entries_of(kind);
+    std::set<std::set<std::string>> pairs, possible;
+    for (const EffectEntry& one : entries) {
+      for (const EffectEntry& other : entries) {
+        if (std::string(one.family) != other.family) {
+          possible.insert({one.family, other.family});
+        }
+      }
+    }
+    for (std::size_t k = 0; k < entries.size() * entries.size(); ++k) {
+      const EffectCase hidden = effect_case(CaseRange::Report, kind, static_cast<int>(k));
+      REQUIRE(hidden.effects().size() == 2);
+      CHECK(hidden.effect.family != hidden.second.family);
+      pairs.insert({hidden.effect.family, hidden.second.family});
+    }
+    CHECK(pairs == possible);
+  }
+  CHECK(effect_case(CaseRange::Report, CaseKind::Moderate, 3).effects().size() == 1);
+  CHECK(effect_case(CaseRange::Report, CaseKind::Nothing, 3).effects().empty());
 }
 
 TEST_CASE("effect cases: tolerated errors are within what is tolerated, and differ between pours") {
@@ -213,6 +238,36 @@ TEST_CASE("cylinder scenarios: paths lead from rest to rest, smoothly, and slosh
       CHECK(strongest > 1);  // the surface leans by a tenth at least
       CHECK(strongest < 6);  // and liquid stays in
       CHECK(jump < 0.15);
+    }
+  }
+}
+
+TEST_CASE("junction scenarios: legs pass what is asked for, and bowls hold what is poured") {
+  for (const JunctionScenario& scenario : junction_scenarios()) {
+    const decant::BoundingVolumeHierarchy pipes(scenario.pipes().mesh());
+    LegOpenings half;
+    half.left = 0.5;
+    const decant::BoundingVolumeHierarchy narrow(scenario.pipes(half).mesh());
+    const auto radius_at = [&](const decant::BoundingVolumeHierarchy& of, double side) {
+      const double share = 0.5;
+      const decant::Vector3<double> middle(side * share * scenario.reach, 0, 0.18 - share * scenario.fall);
+      const auto hit = of.first_hit_along(middle, decant::Vector3<double>::UnitY(), 0.1);
+      return hit ? 0.1 * hit->fraction : 0.0;
+    };
+    for (const double side : {-1.0, 1.0}) {
+      CHECK(radius_at(pipes, side) == Approx(scenario.leg_radius).epsilon(0.01));
+      CHECK(radius_at(narrow, side) == Approx((side < 0 ? std::sqrt(0.5) : 1) * scenario.leg_radius).epsilon(0.02));
+    }
+    for (const std::size_t which : {0U, 1U}) {
+      const decant::InletSettings inlet = scenario.inlet(which);
+      double volume = 0;
+      for (std::size_t k = 1; k < inlet.flow.size(); ++k) {
+        volume +=
+            0.5 * (inlet.flow[k].second + inlet.flow[k - 1].second) * (inlet.flow[k].first - inlet.flow[k - 1].first);
+      }
+      CHECK(volume == Approx(scenario.pours[which].first).epsilon(1e-3));
+      CHECK(volume < scenario.bowl().volume());  // all of it in one
+      CHECK(inlet.flow.back().first + scenario.runs_out == Approx(scenario.duration(which)));
     }
   }
 }

@@ -88,6 +88,28 @@ TEST_CASE("inlet: layers of a steady flow are one spacing apart") {
   }
 }
 
+TEST_CASE("inlet: another flow takes over at once, and nonsense leaves the old one") {
+  SimulatorSettings settings;
+  settings.spacing = 0.006;
+  settings.threads = {1};
+  LiquidSimulator simulator(settings);
+  InletSettings inlet = pouring({{0, 5e-5}, {9, 5e-5}});
+  simulator.add_inlet(inlet, 0);
+  REQUIRE(simulator.inlet_count() == 1);
+  REQUIRE(simulator.step(0.2).advanced());
+  const double layer = 9 * std::pow(0.006, 3);  // at most
+  CHECK(simulator.fluid().mass.sum() / 998.2 == Approx(1e-5).margin(layer));
+  using Flow = std::vector<std::pair<double, double>>;
+  CHECK_THROWS_AS(simulator.set_inlet_flow(1, Flow{}), std::invalid_argument);
+  CHECK_THROWS_AS(simulator.set_inlet_flow(0, Flow{{1, 1e-5}, {1, 1e-5}}), std::invalid_argument);
+  CHECK_THROWS_AS(simulator.set_inlet_flow(0, Flow{{1, -1e-5}}), std::invalid_argument);
+  CHECK(simulator.inlet(0).flow(0.2) == Approx(5e-5));
+  simulator.set_inlet_flow(0, Flow{{0, 1e-4}, {9, 1e-4}});
+  CHECK(simulator.inlet(0).flow(0.2) == Approx(1e-4));
+  REQUIRE(simulator.step(0.2).advanced());
+  CHECK(simulator.fluid().mass.sum() / 998.2 == Approx(3e-5).margin(layer));
+}
+
 TEST_CASE("inlet: in a simulator the liquid arrives and carries its origin") {
   SimulatorSettings settings;
   settings.spacing = 0.006;

@@ -15,6 +15,8 @@
 
 #include <Eigen/Core>
 
+#include <decant/boundary/pipe_blockage.hpp>
+#include <decant/boundary/pipe_section.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
@@ -347,6 +349,48 @@ InteractionEffect<Model> obstacle_effect(BodyId body, const Vector3<double>& pla
       });
   result.of_body = body;
   return result;
+}
+
+/// A pipe that is blocked in part. @param section where, in the frame of the body [m]. @param where in words.
+template <class Model>
+InteractionEffect<Model> blockage_effect(BodyId body, PipeSection section, std::string where) {
+  Effect effect = plain_effect(
+      "obstacle", "", "", "a pipe is blocked in part (its strength is the share that is closed)", {"", 0, 0, 0.95},
+      "simulator.add_body(\"blockage\", pipe_blockage(section, 1 - @, length), motion_of_pipe);");
+  effect.where = std::move(where);
+  auto result = detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics,
+      [body, section = std::move(section)](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+        changes.of_model.push_back([body, section, closed = as.strength[0]](Model& model) {
+          // a gap along the wall that no particle would feel is none; nobody knows how a blockage's edges are rounded
+          constexpr double least = 0.02, flare = 0.3;
+          if (closed > least) {
+            model.add_body("blockage", pipe_blockage(section, 1 - closed, section.radius(), flare),
+                           model.bodies()[body].motion);
+          }
+        });
+      });
+  result.of_body = body;
+  return result;
+}
+
+/// More or less liquid comes in than is known, at the model's first inlet.
+template <class Model>
+InteractionEffect<Model> inlet_flow_effect() {
+  return detail::run_effect<Model>(
+      plain_effect("inlet_flow", "", "", "more or less liquid comes in than assumed (over what is assumed)",
+                   {"", 1, 0.5, 1.5, 0.02}, "simulator.set_inlet_flow(0, flow times @);"),
+      EffectKind::Physics, [](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+        changes.of_model.push_back([factor = as.strength[0]](Model& model) {
+          if (model.inlet_count() > 0) {
+            auto flow = model.inlet(0).settings().flow;
+            for (auto& [time, volume] : flow) {
+              volume *= factor;
+            }
+            model.set_inlet_flow(0, std::move(flow));
+          }
+        });
+      });
 }
 
 /// A container's narrow neck.

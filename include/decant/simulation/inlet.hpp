@@ -76,6 +76,12 @@ class Inlet {
 
   const InletSettings& settings() const noexcept { return settings_; }
 
+  /// Another flow from now on. Throws std::invalid_argument for one whose times do not increase, or below 0.
+  void set_flow(std::vector<std::pair<double, double>> flow) {
+    detail::expects_flow("Inlet", flow);
+    settings_.flow = std::move(flow);
+  }
+
  private:
   InletSettings settings_;
   double spacing_;

@@ -181,6 +181,16 @@ class Simulator {
     inlets_.push_back({Inlet(inlet, settings_.spacing), origin});
   }
 
+  /// Inlets are numbered in the order in which they were added.
+  std::size_t inlet_count() const noexcept { return inlets_.size(); }
+  /// @param number < inlet_count().
+  const Inlet& inlet(std::size_t number) const noexcept { return inlets_[number].first; }
+  /// Another flow from now on. Throws std::invalid_argument for an inlet that there is not, and as Inlet::set_flow.
+  void set_inlet_flow(std::size_t number, std::vector<std::pair<double, double>> flow) {
+    expects(number < inlets_.size(), "Simulator: number of an inlet", "one that was added", number);
+    inlets_[number].first.set_flow(std::move(flow));
+  }
+
   /// Adds an outlet: particles leave at the flow that it is asked for, as far as there is liquid within its radius
   /// (StepReport::drained). Where it has an exit, a particle goes on there, the same one (id, origin), as soon as there
   /// is a place near the exit a spacing off all other liquid; until then it stays, and so does all that would follow.
