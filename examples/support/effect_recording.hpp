@@ -19,7 +19,8 @@
 namespace example {
 
 inline bool is_of_cylinder(const EffectCase& of) {
-  return of.kind == word(CaseKind::Cylinder) || of.kind == word(CaseKind::CylinderTwo);
+  const auto kind = case_kinds().find(of.kind);  // a reference has none
+  return kind != case_kinds().end() && is_of_cylinder(kind->second);
 }
 
 inline bool is_of_junction(const EffectCase& of) { return of.kind == word(CaseKind::Junction); }

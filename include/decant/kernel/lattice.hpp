@@ -34,8 +34,7 @@ double sum_over_others(double h, double spacing) noexcept {
 /// spacing d add up to, so that the lattice has its density exactly. With W(0, h) itself a sum over few neighbours is
 /// too large where a kernel is steep: by 3.4 % for Wendland C2 and by 6.7 % for C4 with a support of two spacings, and
 /// liquid at rest stands as much too high; the cubic spline is right to 1e-4. After the correction of a particle's
-/// share in its own density by Dehnen & Aly 2012 (section 2.5), who fit it to glass; ours is of the lattice that liquid
-/// starts from and stays close to.
+/// share in its own density by Dehnen & Aly 2012; ours is of the lattice that liquid starts from and stays close to.
 template <SmoothingKernel Kernel>
 typename Kernel::Scalar own_value(double h, double spacing) noexcept {
   return static_cast<typename Kernel::Scalar>(1 / (spacing * spacing * spacing) -
