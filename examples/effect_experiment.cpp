@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,7 @@ int main(int count, char** values) {
   example::CaseRange range = example::CaseRange::Develop;
   std::vector<std::string> kinds{"nothing", "moderate", "weak", "outside", "measurement"};
   int first = 0, most = 1000;
+  bool advise = false;
   std::vector<std::size_t> scenarios;
   example::EffectExperimentOptions options;
   double reality_mm = 1e3 * options.recording.spacing, model_mm = 1e3 * options.model.model.spacing;
@@ -36,6 +38,15 @@ int main(int count, char** values) {
   app.add_option("--first", first, "number of the first case of each kind")->check(CLI::Range(0, 1000000));
   app.add_option("--cases", most, "of each kind, at most")->check(CLI::Range(1, 1000000));
   app.add_option("--scenarios", scenarios, "only cases of these, several by commas")->delimiter(',');
+  app.add_option("--solver", options.recording.solver,
+                 "of the reality of pours: divergence_free, as models have it, or position_based")
+      ->transform(CLI::CheckedTransformer(example::reality_solvers()));
+  app.add_option("--references", options.references,
+                 "how many recordings of other pours are given in which nothing is missing; with kinds of pours")
+      ->check(CLI::Range(0, 100));
+  app.add_flag("--advise", advise,
+               "where several effects are left, has another interaction recorded, one that is advised and one that is "
+               "drawn by chance, and judges again");
   app.add_flag("--both", options.both, "learns from both pours of a case, and holds out none");
   app.add_option("--threads", options.threads, "recordings or runs side by side, each on one thread; 0: one per core")
       ->check(CLI::Range(0, 1024));
@@ -56,6 +67,9 @@ int main(int count, char** values) {
     example::expect_writable({json_file, report_file});
     std::vector<example::EffectCase> cases;
     for (const std::string& kind : kinds) {
+      if (options.references > 0 && !example::is_of_pours(example::case_kinds().at(kind))) {
+        throw std::runtime_error("--references: expected kinds of pours, not " + kind);
+      }
       const example::CaseKind of = example::case_kinds().at(kind);
       const int end = std::min(first + most, example::usual_cases(range, of));
       for (int number = first; number < end; ++number) {
@@ -69,6 +83,9 @@ int main(int count, char** values) {
     std::stable_sort(cases.begin(), cases.end(), [](const auto& a, const auto& b) { return a.scenario < b.scenario; });
     example::EffectExperiment experiment(options);
     experiment.run(cases);
+    if (advise) {
+      experiment.follow_advice(cases);
+    }
     return example::tell_experiment(
         {"What the model lacks", 2 * cases.size(), 3, reality_mm,
          decant::detail::number_text(model_mm) + " mm in the model. What is hidden is not told to the search."},

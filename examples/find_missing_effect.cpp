@@ -138,6 +138,9 @@ int main(int count, char** values) {
     Interactions learn = interactions_of(learn_folders), held_out = interactions_of(held_out_folders),
                  references = interactions_of(reference_folders), proposed = interactions_of(proposed_folders, true);
     const std::vector<decant::Effect>& effects = kept.front()->model.effects();
+    for (const decant::Interaction<example::RecordedModel>& each : proposed) {
+      example::expect_same_effects(effects, each.model->effects(), each.name);
+    }
     const auto planned =
         static_cast<double>(decant::plan_dictionary(effects, settings.dictionary).size() * learn_folders.size());
     decant::Progress progress("finding", planned);
@@ -171,9 +174,6 @@ int main(int count, char** values) {
     const std::vector<decant::PossibleEffect> possible = decant::possible_effects(result, effects);
     std::vector<decant::InteractionAdvice> advice;
     if (possible.size() > 1 && !proposed.empty()) {
-      for (const decant::Interaction<example::RecordedModel>& each : proposed) {
-        example::expect_same_effects(effects, each.model->effects(), each.name);
-      }
       advice = decant::advise_next_interaction(possible, std::move(proposed), result.learn, run_jobs, settings);
     }
     progress.finish();

@@ -47,7 +47,8 @@ int main(int count, char** values) {
       ->needs(nothing);
   app.add_option("--seed", seed, "of a reference: tolerated errors and noise")->needs(nothing);
   nothing->excludes(numbered);
-  app.add_option("--pour", pours, "a, b or both")->check(CLI::IsMember({"a", "b", "both"}));
+  app.add_option("--pour", pours, "a, b or both, or one of c, d, e, f: what may be recorded next")
+      ->check(CLI::IsMember({"a", "b", "c", "d", "e", "f", "both"}));
   app.add_flag("--without-effect", without, "the same errors and noise, but nothing is hidden");
   app.add_flag("--truth-masks", settings.truth_masks, "writes clean silhouettes, too");
   app.add_flag("--scale", settings.scale, "weighs what is in the pan, too");
@@ -78,9 +79,9 @@ int main(int count, char** values) {
         plain ? example::reference_case(scenario, seed) : example::effect_case(range, kind, number);
     decant::Progress progress("recording", pours == "both" ? 2 : 1);
     double done = 0;
-    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
-      const std::string pour = which == 0 ? "a" : "b";
-      if (pours == "both" || pours == pour) {
+    for (std::size_t which = 0; which < 2 + example::further_interactions; ++which) {
+      const std::string pour = example::interaction_letter(which);
+      if (pours == pour || (pours == "both" && which < 2)) {
         example::record_case(hidden, which, std::filesystem::path(out) / pour, settings,
                              [&](double share) { progress.update(done + share); });
         ++done;

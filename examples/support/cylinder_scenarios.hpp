@@ -8,6 +8,8 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -54,10 +56,40 @@ struct CylinderPath {
 struct CylinderScenario {
   double radius = 0, depth = 0;  ///< of the water [m]
   std::array<CylinderPath, 2> paths{};
+
+  /// One of the two, or another like the first: turned by a right angle, in faster and smaller swings, in slower and
+  /// larger ones, up and down as well. Throws std::out_of_range for what is none of them.
+  CylinderPath path(std::size_t which) const {
+    if (which < paths.size()) {
+      return paths[which];
+    }
+    CylinderPath path = paths[0];
+    switch (which) {
+      case 2:
+        std::swap(path.reach.x(), path.reach.y());
+        std::swap(path.frequency.x(), path.frequency.y());
+        break;
+      case 3:
+        path.reach *= 0.6;
+        path.frequency *= 1.3;
+        break;
+      case 4:
+        path.reach *= 1.5;
+        path.frequency *= 0.75;
+        break;
+      case 5:
+        path.reach.z() = 0.04;
+        path.frequency.z() = 1.5;
+        break;
+      default:
+        throw std::out_of_range("CylinderScenario::path: expected one of six");
+    }
+    return path;
+  }
 };
 
-/// The first ones are to develop with, the others to report on. Paths to learn from are in no upright plane: to heights, a
-/// pull and its mirror image would be the same.
+/// The first ones are to develop with, the others to report on. Paths to learn from are in no upright plane: to
+/// heights, a pull and its mirror image would be the same.
 inline constexpr std::size_t cylinder_scenarios_to_develop = 2;
 
 inline const std::vector<CylinderScenario>& cylinder_scenarios() {

@@ -229,6 +229,7 @@ inline const std::vector<EffectEntry>& entries_of(CaseKind kind) {
 
 inline bool has_two(CaseKind kind) { return kind == CaseKind::Two || kind == CaseKind::CylinderTwo; }
 inline bool is_of_cylinder(CaseKind kind) { return kind == CaseKind::Cylinder || kind == CaseKind::CylinderTwo; }
+inline bool is_of_pours(CaseKind kind) { return !is_of_cylinder(kind) && kind != CaseKind::Junction; }
 
 /// The scenarios of a range, in turn: numbers of effect_scenarios(), cylinder_scenarios() or junction_scenarios().
 inline std::vector<std::size_t> scenarios_of(CaseRange range, CaseKind kind) {
@@ -350,13 +351,18 @@ inline EffectCase effect_case(CaseRange range, CaseKind kind, int number) {
   return hidden;
 }
 
-/// How many cases of a kind there are to look at: each effect in each of the range's scenarios, and enough of the
-/// others to count false alarms by.
+/// How many cases of a kind there are to look at: each effect in each of the range's scenarios, and enough of all to
+/// count right answers and false alarms by.
 inline int usual_cases(CaseRange range, CaseKind kind) {
   const auto scenarios = static_cast<int>(scenarios_of(range, kind).size());
   const auto effects = static_cast<int>(entries_of(kind).size());
-  const int turns = kind == CaseKind::Junction ? 2 : 1;
-  return kind == CaseKind::Nothing ? 4 * scenarios : turns * effects * scenarios;
+  const bool report = range == CaseRange::Report;
+  if (kind == CaseKind::Nothing) {
+    return (report ? 16 : 4) * scenarios;
+  }
+  const bool twice =
+      kind == CaseKind::Junction || (report && (kind == CaseKind::Moderate || kind == CaseKind::Measurement));
+  return (twice ? 2 : 1) * effects * scenarios;
 }
 
 /// By the words of a command line.

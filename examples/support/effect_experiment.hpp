@@ -6,9 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <stdexcept>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 
 #include <decant/core/stopwatch.hpp>
 #include <decant/discovery/missing_effect.hpp>
+#include <decant/discovery/next_interaction.hpp>
 #include <decant/hypothesis/thread_executor.hpp>
 #include <decant/io/journal.hpp>
 #include <decant/io/recording_reader.hpp>
@@ -35,6 +37,7 @@ struct EffectExperimentOptions {
   InteractionOptions model{};
   decant::MissingEffectSettings search{};
   bool both = false;   ///< learns from both pours of a case, and holds out none
+  int references = 0;  ///< recordings in which nothing is missing, of other pours of the range; of pours alone
   int threads = 0;     ///< how many recordings or runs are in work side by side; 0: one per core
   bool again = false;  ///< judges anew what is there already
 };
@@ -62,30 +65,91 @@ class EffectExperiment {
   void run(const std::vector<EffectCase>& cases) {
     std::vector<ExperimentJob> jobs;
     for (const EffectCase& each : cases) {
-      jobs.push_back(
-          {key(each), settings_json(each), {recording_of(each, 0), recording_of(each, 1)}, [this, each](const auto&) {
-             return judge(each);
-           }});
+      ExperimentJob& job = jobs.emplace_back(ExperimentJob{key(each), settings_json(each), recordings_of(each, {0, 1}),
+                                                           [this, each](const auto&) { return judge(each); }});
+      for (int k = 0; k < options_.references; ++k) {
+        job.recordings.push_back(reference(each, k));
+      }
     }
     folder_.run("finding effects", jobs, true);  // the runs for one are made side by side
   }
 
   /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
   const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
+
+  /// For cases that leave several effects: asks which of the further interactions would tell them apart, and judges
+  /// again with that one as well, and with one that is drawn by chance. They are not learnt from, as that would take
+  /// simulations of all effects anew: what is left is told apart by how well it predicts them.
+  void follow_advice(const std::vector<EffectCase>& cases) {
+    std::vector<ExperimentJob> jobs;
+    for (const EffectCase& each : cases) {
+      if (result(each).at("verdict") == "one_of") {
+        jobs.push_back({advised_key(each), settings_json(each), recordings_of(each, {0, 1, 2, 3, 4, 5}),
+                        [this, each](const auto&) { return judge_with_further(each); }});
+      }
+    }
+    folder_.run("following advice", jobs, true);
+  }
+
+  /// What came of advice, or null where none was asked for: `left` before it; of each of `after_advised` and
+  /// `after_drawn` which interaction it was, and the answer as result() has it.
+  const nlohmann::json* followed(const EffectCase& of) const {
+    const auto found = folder_.results().find(advised_key(of));
+    return found == folder_.results().end() ? nullptr : &found->second;
+  }
+
   const ExperimentFolder& folder() const { return folder_; }
 
  private:
-  std::string key(const EffectCase& of) const { return case_name(of) + (options_.both ? "_both" : ""); }
-  static std::string recording_name(const EffectCase& of, std::size_t which) {
-    return case_name(of) + (which == 0 ? "_a" : "_b");
+  using Kept = std::vector<std::unique_ptr<RecordedInteraction>>;
+  using Interactions = std::vector<decant::Interaction<RecordedModel>>;
+
+  /// Runs of a scenario's model.
+  struct ScenarioRuns {
+    decant::Journal journal;
+    std::size_t computed = 0;  ///< the others were there
+  };
+
+  std::string solver() const {
+    return options_.recording.solver == RealitySolver::DivergenceFree ? "" : "_position_based";
+  }
+  std::string key(const EffectCase& of) const {
+    return case_name(of) + solver() +
+           (options_.references > 0 ? "_" + std::to_string(options_.references) + "_references" : "") +
+           (options_.both ? "_both" : "");
+  }
+  std::string advised_key(const EffectCase& of) const { return key(of) + "_advised"; }
+  std::string recording_name(const EffectCase& of, std::size_t which) const {
+    return case_name(of) + solver() + "_" + interaction_letter(which);
   }
 
-  ExperimentRecording recording_of(const EffectCase& of, std::size_t which) const {
+  ExperimentRecording recording(const EffectCase& of, std::size_t which, std::string name) const {
     const EffectRecordingSettings settings = options_.recording;
-    return {recording_name(of, which), of.seed, reality_spacing(of, settings), case_frames(of, which, settings),
+    return {std::move(name), of.seed, reality_spacing(of, settings), case_frames(of, which, settings),
             [of, which, settings](const auto& folder, const auto& progress) {
               record_case(of, which, folder, settings, progress);
             }};
+  }
+
+  std::vector<ExperimentRecording> recordings_of(const EffectCase& of, const std::vector<std::size_t>& which) const {
+    std::vector<ExperimentRecording> recordings;
+    for (const std::size_t each : which) {
+      recordings.push_back(recording(of, each, recording_name(of, each)));
+    }
+    return recordings;
+  }
+
+  /// Of the range's other scenarios in turn, and of their first pours before their second ones.
+  ExperimentRecording reference(const EffectCase& of, int number) const {
+    const std::vector<std::size_t> scenarios = scenarios_of(case_ranges().at(of.range), CaseKind::Nothing);
+    const auto own =
+        static_cast<std::size_t>(std::find(scenarios.begin(), scenarios.end(), of.scenario) - scenarios.begin());
+    const std::size_t others = scenarios.size() - 1, k = static_cast<std::size_t>(number);
+    const std::size_t scenario = scenarios[(own + 1 + k % others) % scenarios.size()], which = k / others % 2;
+    const std::size_t seed = 1 + k / (2 * others);
+    return recording(reference_case(scenario, static_cast<std::uint32_t>(seed)), which,
+                     "reference_" + std::to_string(scenario) + "_" + std::to_string(seed) + solver() + "_" +
+                         interaction_letter(which));
   }
 
   /// Of a case's model. A cylinder holds three times what is poured, and is read more often: particles are as coarse as
@@ -114,42 +178,106 @@ class EffectExperiment {
             {"longest_s", number_json(options_.recording.longest)}};
   }
 
-  nlohmann::json judge(const EffectCase& of) {
+  /// @param planned see InteractionOptions.
+  std::unique_ptr<RecordedInteraction> interaction(const EffectCase& of, const std::string& name,
+                                                   bool planned = false) const {
     InteractionOptions options = model_of_case(of);
-    std::vector<RecordedInteraction> kept;
-    for (const std::size_t which : {0, 1}) {
-      decant::Recording recording = decant::read_recording(folder_.recording(recording_name(of, which)));
-      options.gain_of = uncertain_gains(recording);
-      kept.push_back(recorded_interaction(std::move(recording), options));
-    }
-    std::vector<decant::Interaction<RecordedModel>> learn{kept[0].interaction("a")}, held_out;
-    (options_.both ? learn : held_out).push_back(kept[1].interaction("b"));
+    decant::Recording recording = decant::read_recording(folder_.recording(name));
+    options.gain_of = uncertain_gains(recording);
+    options.planned = planned;
+    return std::make_unique<RecordedInteraction>(recorded_interaction(std::move(recording), options));
+  }
+
+  ScenarioRuns runs_of(const EffectCase& of) const {
     const std::string scenario = (is_of_cylinder(of)   ? "cylinder_"
                                   : is_of_junction(of) ? "junction_"
                                                        : "scenario_") +
                                  std::to_string(of.scenario);
-    decant::Journal journal(options_.folder / "runs" / (scenario + ".journal"),
+    return {decant::Journal(options_.folder / "runs" / (scenario + ".journal"),
                             std::string("effect_experiment of decant ") + DECANT_VERSION + " at " +
-                                decant::detail::number_text(1e3 * options.model.spacing) + " mm");
-    std::size_t computed = 0;
-    const decant::RunJobs run_jobs = [&](const std::vector<std::string>& keys,
-                                         const std::function<decant::JobResult(std::size_t)>& work) {
-      return decant::run_journaled(executor_, journal, keys, work,
-                                   [&](std::size_t, const decant::JobResult&) { ++computed; });
+                                decant::detail::number_text(1e3 * model_of_case(of).model.spacing) + " mm")};
+  }
+
+  /// For as long as `runs` is there.
+  decant::RunJobs jobs_of(ScenarioRuns& runs) {
+    return [&](const std::vector<std::string>& keys, const std::function<decant::JobResult(std::size_t)>& work) {
+      return decant::run_journaled(executor_, runs.journal, keys, work,
+                                   [&](std::size_t, const decant::JobResult&) { ++runs.computed; });
     };
+  }
+
+  decant::MissingEffectSettings search_of(const EffectCase& of) const {
+    return search_settings(options_.search, model_of_case(of));
+  }
+
+  decant::MissingEffect search(const EffectCase& of, Interactions learn, Interactions held_out, ScenarioRuns& runs,
+                               Interactions references = {}) {
+    return decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), jobs_of(runs),
+                                                      search_of(of), std::move(references))
+        .find();
+  }
+
+  nlohmann::json judge(const EffectCase& of) {
+    Kept kept;
+    Interactions learn, held_out, references;
+    for (const std::size_t which : {std::size_t{0}, std::size_t{1}}) {
+      kept.push_back(interaction(of, recording_name(of, which)));
+      (which == 0 || options_.both ? learn : held_out).push_back(kept.back()->interaction(interaction_letter(which)));
+    }
+    for (int k = 0; k < options_.references; ++k) {
+      const std::string name = reference(of, k).name;
+      kept.push_back(interaction(of, name));
+      references.push_back(kept.back()->interaction(name));
+    }
+    ScenarioRuns runs = runs_of(of);
     double milliseconds = 0;
     decant::MissingEffect found;
     {
       const decant::Stopwatch watch(milliseconds);
-      found = decant::MissingEffectSearch<RecordedModel>(std::move(learn), std::move(held_out), run_jobs,
-                                                         search_settings(options_.search, options))
-                  .find();
+      found = search(of, std::move(learn), std::move(held_out), runs, std::move(references));
     }
-    nlohmann::json json = missing_effect_json(found.judged, found, kept[0].recording.gravity);
+    nlohmann::json json = missing_effect_json(found.judged, found, kept[0]->recording.gravity);
     json["status"] = "ok";
     json["seconds"] = 1e-3 * milliseconds;
-    json["runs_computed"] = computed;
+    json["runs_computed"] = runs.computed;
     json["truth"] = folder_.truth(recording_name(of, 0));
+    return json;
+  }
+
+  nlohmann::json judge_with_further(const EffectCase& of) {
+    Kept kept;
+    Interactions seen, proposed;
+    for (std::size_t which = 0; which < 2 + further_interactions; ++which) {
+      kept.push_back(interaction(of, recording_name(of, which)));
+      seen.push_back(kept.back()->interaction(interaction_letter(which)));
+      if (which >= 2) {
+        kept.push_back(interaction(of, recording_name(of, which), true));
+        proposed.push_back(kept.back()->interaction(interaction_letter(which)));
+      }
+    }
+    ScenarioRuns runs = runs_of(of);
+    const decant::MissingEffect found = search(of, {seen[0]}, {seen[1]}, runs);
+    const std::vector<decant::PossibleEffect> possible = decant::possible_effects(found, kept.front()->model.effects());
+    nlohmann::json json{{"status", "ok"}, {"left", nlohmann::json::array()}};
+    for (const decant::PossibleEffect& each : possible) {
+      json["left"].push_back(kept.front()->model.effects().at(each.effect.effect).name);
+    }
+    if (possible.size() < 2) {
+      return json;
+    }
+    const std::vector<decant::InteractionAdvice> advice =
+        decant::advise_next_interaction(possible, std::move(proposed), found.learn, jobs_of(runs), search_of(of));
+    const std::size_t by_chance = detail::mixed_seed({of.seed, 31U}) % further_interactions;
+    for (const auto& [key, which] : {std::pair{"after_advised", advice.front().which}, {"after_drawn", by_chance}}) {
+      const decant::MissingEffect after = search(of, {seen[0]}, {seen[1], seen[2 + which]}, runs);
+      nlohmann::json& told = json[key] = missing_effect_json(after.judged, after, kept[0]->recording.gravity);
+      told["interaction"] = interaction_letter(2 + which);
+      told["truth"] = folder_.truth(recording_name(of, 0));
+      const auto asked =
+          std::find_if(advice.begin(), advice.end(), [&](const auto& each) { return each.which == which; });
+      told["gain_bit"] = number_json(asked->gain);
+      told["settles"] = number_json(asked->settles);
+    }
     return json;
   }
 

@@ -30,7 +30,8 @@ inline double reality_spacing(const EffectCase& of, const EffectRecordingSetting
   return is_of_cylinder(of) ? 1.6 * settings.spacing : is_of_junction(of) ? 1.1 * settings.spacing : settings.spacing;
 }
 
-/// How many frames a recording of a case has. @param which 0: a, to learn from; 1: b, to be predicted.
+/// How many frames a recording of a case has. @param which 0: a, to learn from; 1: b, to be predicted; then further
+/// ones.
 inline std::size_t case_frames(const EffectCase& of, std::size_t which, const EffectRecordingSettings& settings) {
   if (is_of_cylinder(of)) {
     return static_cast<std::size_t>(cylinder_frames(of, which, settings));
@@ -38,7 +39,7 @@ inline std::size_t case_frames(const EffectCase& of, std::size_t which, const Ef
   if (is_of_junction(of)) {
     return static_cast<std::size_t>(junction_frames(of, which, settings));
   }
-  const double seconds = std::min(effect_scenarios().at(of.scenario).pours.at(which).duration, settings.longest);
+  const double seconds = std::min(effect_scenarios().at(of.scenario).pour(which).duration, settings.longest);
   return static_cast<std::size_t>(std::max(1L, std::lround(seconds * settings.frames_per_second)));
 }
 

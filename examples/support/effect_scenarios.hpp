@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -150,6 +151,12 @@ struct PourPlan {
   std::vector<TiltKnot> tilt{};
 };
 
+/// What may be recorded of a scenario beside the one that is learnt from and the one that is predicted.
+inline constexpr std::size_t further_interactions = 4;
+
+/// "a" for the one to learn from, "b" for the one to be predicted, then those that may be recorded next.
+inline std::string interaction_letter(std::size_t which) { return std::string(1, static_cast<char>('a' + which)); }
+
 /// Two pours into one pan, seen by one camera: one to learn from, one to be predicted.
 struct EffectScenario {
   EffectPan pan{};
@@ -162,9 +169,42 @@ struct EffectScenario {
     return {std::cos(angle), std::sin(angle), 0};
   }
   decant::Vector3<double> across() const { return decant::Vector3<double>::UnitZ().cross(ahead()); }
+  /// One of the two, or another from the first one's container: from higher, in jerks, slowly, of less liquid. Throws
+  /// std::out_of_range for what is none of them.
+  PourPlan pour(std::size_t which) const {
+    if (which < pours.size()) {
+      return pours[which];
+    }
+    PourPlan plan = pours[0];
+    const TiltKnot first = plan.tilt.front(), last = plan.tilt.back();
+    const auto tilted = [&](double time_share, double tilt_share) {
+      return TiltKnot{std::lerp(first.time, last.time, time_share),
+                      std::lerp(first.tilt_deg, last.tilt_deg, tilt_share)};
+    };
+    switch (which) {
+      case 2:
+        plan.lip_height += 0.06;
+        plan.lip_behind += 0.012;  // what falls longer gets farther
+        break;
+      case 3:
+        plan.tilt = {first, tilted(0.3, 0.7), tilted(0.45, 0.4), tilted(0.8, 1)};
+        break;
+      case 4:
+        plan.tilt.back().time = std::lerp(first.time, last.time, 1.3);
+        plan.duration += 0.3 * (last.time - first.time);
+        break;
+      case 5:
+        plan.fill *= 0.75;
+        break;
+      default:
+        throw std::out_of_range("EffectScenario::pour: expected one of six");
+    }
+    return plan;
+  }
   /// Where the lip is kept in a pour [m], but for a hand's tremor.
   decant::Vector3<double> lip(std::size_t which) const {
-    return decant::Vector3<double>(0, 0, pours[which].lip_height) - pours[which].lip_behind * ahead();
+    const PourPlan plan = pour(which);
+    return decant::Vector3<double>(0, 0, plan.lip_height) - plan.lip_behind * ahead();
   }
   /// About where the jets of both pours are at a share of their height, 0 at the pan, 1 at the lip [m]. Liquid leaves
   /// about level, and falls ahead of the lip by some 9 cm: the plans are such that it lands in the pan.
@@ -235,7 +275,7 @@ class RecordedMotion {
  public:
   /// @param which of the scenario's pours.
   RecordedMotion(std::size_t scenario, std::size_t which)
-      : plan_(effect_scenarios().at(scenario).pours.at(which)),
+      : plan_(effect_scenarios().at(scenario).pour(which)),
         lip_in_body_(effect_container(plan_.container).lip),
         lip_(effect_scenarios()[scenario].lip(which)),
         heading_(effect_scenarios()[scenario].heading_deg * std::numbers::pi / 180),

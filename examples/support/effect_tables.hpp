@@ -395,6 +395,48 @@ inline ExperimentSection calibration(const std::vector<EffectScore>& scores) {
   return section;
 }
 
+/// What a further interaction leaves of several effects.
+inline ExperimentSection advised(const EffectExperiment& experiment, const std::vector<EffectCase>& cases) {
+  using decant::detail::fixed_text;
+  ExperimentSection section{"One more interaction where several effects are left",
+                            decant::Table({"case", "hidden", "left", "advised", "expected [bit]", "answer then",
+                                           "drawn by chance", "expected [bit]", "answer then"})};
+  std::map<std::string, std::size_t> settled{{"after_advised", 0}, {"after_drawn", 0}}, misled = settled;
+  std::size_t asked = 0;
+  for (const EffectCase& each : cases) {
+    const nlohmann::json* followed = experiment.followed(each);
+    if (followed == nullptr || !followed->contains("after_advised")) {
+      continue;
+    }
+    ++asked;
+    std::string left;
+    for (const auto& name : followed->at("left")) {
+      left += (left.empty() ? "" : ", ") + name.get<std::string>();
+    }
+    std::vector<std::string> row{case_name(each), followed->at("after_advised").at("truth").at("effect"), left};
+    for (const char* key : {"after_advised", "after_drawn"}) {
+      const nlohmann::json& after = followed->at(key);
+      const EffectScore score{&each, &after};
+      settled[key] += score.verdict() == "named" && score.score() == AnswerScore::Right ? 1 : 0;
+      misled[key] += score.verdict() == "named" && score.score() == AnswerScore::Wrong ? 1 : 0;
+      row.insert(row.end(), {after.at("interaction"), fixed_text(number_at(after, "/gain_bit"), 2), score.answer()});
+    }
+    section.table.add(row);
+  }
+  const auto of = [&](const char* key) {
+    return std::to_string(settled[key]) + " of " + std::to_string(asked) + " (a wrong one " +
+           std::to_string(misled[key]) + " times)";
+  };
+  section.note = "One effect is left, the right one: " + of("after_advised") + " where advice was followed, " +
+                 of("after_drawn") + " where chance chose.";
+  section.json = {{"cases", asked},
+                  {"settled_by_advice", settled["after_advised"]},
+                  {"settled_by_chance", settled["after_drawn"]},
+                  {"misled_by_advice", misled["after_advised"]},
+                  {"misled_by_chance", misled["after_drawn"]}};
+  return section;
+}
+
 inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
   using decant::detail::fixed_text;
   ExperimentSection section{
@@ -437,6 +479,9 @@ inline std::vector<ExperimentSection> effect_tables(const EffectExperiment& expe
   }
   if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "two"; })) {
     sections.push_back(detail::two_at_once(scores));
+  }
+  if (std::any_of(cases.begin(), cases.end(), [&](const auto& each) { return experiment.followed(each) != nullptr; })) {
+    sections.push_back(detail::advised(experiment, cases));
   }
   sections.push_back(detail::calibration(scores));
   sections.push_back(detail::all_cases(scores));

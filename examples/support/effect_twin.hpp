@@ -156,7 +156,7 @@ class EffectReality {
                 double recorded_volume, double spacing)
       : effects_(effects),
         scenario_(effect_scenarios().at(hidden.scenario)),
-        container_(effect_container(scenario_.pours.at(which).container)),
+        container_(effect_container(scenario_.pour(which).container)),
         errors_(tolerated_errors(hidden, which)),
         container_motion_(true_container_motion(RecordedMotion(hidden.scenario, which))),
         pan_motion_(true_pan_motion()),
@@ -464,7 +464,7 @@ nlohmann::json effect_truth(const EffectCase& hidden, const std::vector<HiddenEf
   truth["kind"] = hidden.kind;
   truth["case"] = hidden.number;
   truth["scenario"] = hidden.scenario;
-  truth["pour"] = which == 0 ? "a" : "b";
+  truth["pour"] = interaction_letter(which);
   truth["seed"] = hidden.seed;
   truth["tolerated"] = {{"latency_s", errors.latency},
                         {"fill_share", errors.fill},
@@ -485,7 +485,7 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
                         const EffectRecordingSettings& settings, const std::function<void(double)>& progress) {
   using namespace decant;
   const EffectScenario& scenario = effect_scenarios().at(hidden.scenario);
-  const PourPlan& plan = scenario.pours.at(which);
+  const PourPlan plan = scenario.pour(which);
   const std::vector<HiddenEffect> effects = settings.with_effect ? hidden.effects() : std::vector<HiddenEffect>{};
   const BodyShape container = effect_container(plan.container).shape;
   const double recorded_volume = 1e-7 * std::round(1e7 * plan.fill * Cavity(container.mesh).volume());
@@ -497,7 +497,7 @@ void record_effect_pour(const EffectCase& hidden, std::size_t which, const std::
   }
 
   Recording header;
-  header.name = "scenario" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
+  header.name = "scenario" + std::to_string(hidden.scenario) + "_" + interaction_letter(which);
   header.frames_per_second = settings.frames_per_second;
   header.bodies.push_back({1, plan.container, recording::Role::Source, {}, container.mesh, {}});
   header.bodies.push_back({2, "pan", recording::Role::Target, {}, scenario.pan.shape().mesh, {}});

@@ -117,7 +117,7 @@ inline void record_effect_junction(
   const auto poses = scenario.bowl_poses();
 
   Recording header;
-  header.name = "junction" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
+  header.name = "junction" + std::to_string(hidden.scenario) + "_" + interaction_letter(which);
   header.frames_per_second = settings.frames_per_second;
   header.bodies.push_back({1, "junction", recording::Role::Junction, {}, scenario.pipes().mesh(), {}});
   header.bodies.push_back({2, "left bowl", recording::Role::Target, {}, scenario.bowl().mesh(), {}});

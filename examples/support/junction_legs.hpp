@@ -4,7 +4,9 @@
 /// The ways out of a recorded pipe junction.
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -21,9 +23,33 @@ namespace example {
 
 /// A way out of the junction.
 struct JunctionLeg {
-  std::string name;             ///< left, right; leg_1, leg_2 .. if there are more than two
-  decant::PipeSection section;  ///< where a blockage is tried, in the body's frame
+  std::string name;                         ///< left, right; leg_1, leg_2 .. if there are more than two
+  decant::PipeSection section;              ///< where a blockage is tried, in the body's frame
+  std::vector<decant::PipeSection> line{};  ///< its middle from the opening to where it branches, in the body's frame
 };
+
+/// Sections of a leg at which it has an underside, no more than `apart` [m] from one to the next and half of that to
+/// where such a part of the leg ends. @param down in the body's frame, unit length.
+inline std::vector<decant::PipeSection> sections_with_underside(const JunctionLeg& leg,
+                                                                const decant::Vector3<double>& down, double apart) {
+  std::vector<decant::PipeSection> chosen;
+  const auto level = [&](const decant::PipeSection& section) { return std::abs(section.direction.dot(down)) < 0.7; };
+  for (auto from = leg.line.begin(); from != leg.line.end();) {
+    from = std::find_if(from, leg.line.end(), level);
+    const auto end = std::find_if_not(from, leg.line.end(), level);
+    if (from == end) {
+      break;
+    }
+    const double length = std::prev(end)->distance - from->distance;
+    const int parts = std::max(1, static_cast<int>(std::ceil(length / apart)));
+    for (int k = 0; k < parts; ++k) {
+      const double middle = from->distance + (k + 0.5) / parts * length;
+      chosen.push_back(*std::find_if(from, std::prev(end), [&](const auto& each) { return each.distance >= middle; }));
+    }
+    from = end;
+  }
+  return chosen;
+}
 
 /// The junction that is meant: the first body of that role. Throws std::runtime_error if there is none.
 inline std::size_t junction_of(const decant::Recording& recording) {
@@ -69,7 +95,7 @@ inline std::vector<JunctionLeg> junction_legs(const decant::Recording& recording
     const auto half_way = std::find_if(line.begin(), line.end(), [&](const PipeSection& section) {
       return section.distance >= 0.5 * line.back().distance;
     });
-    JunctionLeg leg{"leg_" + std::to_string(legs.size() + 1), *half_way};
+    JunctionLeg leg{"leg_" + std::to_string(legs.size() + 1), *half_way, line};
     if (openings.size() == 2) {
       leg.name = legs.empty() ? "left" : "right";
     }

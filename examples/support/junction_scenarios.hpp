@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -36,7 +37,28 @@ struct JunctionScenario {
   static constexpr double begin = 0.2;     ///< of pours [s]
   static constexpr double runs_out = 0.7;  ///< for which it is watched after [s]
 
-  double duration(std::size_t which) const { return begin + pours.at(which).second + runs_out; }  ///< [s]
+  /// Volume [m^3] and time [s] of one of the two, or of another like the first: faster, slower, less, more. Throws
+  /// std::out_of_range for what is none of them.
+  std::pair<double, double> pour(std::size_t which) const {
+    if (which < pours.size()) {
+      return pours[which];
+    }
+    const auto [volume, seconds] = pours[0];
+    switch (which) {
+      case 2:
+        return {volume, 0.75 * seconds};
+      case 3:
+        return {volume, 1.3 * seconds};
+      case 4:
+        return {0.6 * volume, seconds};
+      case 5:
+        return {1.2 * volume, seconds};
+      default:
+        throw std::out_of_range("JunctionScenario::pour: expected one of six");
+    }
+  }
+
+  double duration(std::size_t which) const { return begin + pour(which).second + runs_out; }  ///< [s]
 
   /// A leg that is blocked in part has a bore that narrows and widens again at once.
   decant::PipeNetwork pipes(const LegOpenings& open = {}) const {
@@ -71,7 +93,7 @@ struct JunctionScenario {
     decant::InletSettings from_above;
     from_above.position = {0, 0, 0.207};
     from_above.radius = 0.015;
-    const auto [volume, seconds] = pours.at(which);
+    const auto [volume, seconds] = pour(which);
     constexpr int steps = 30;
     for (int k = 0; k <= steps; ++k) {  // grows and ends smoothly
       const double share = static_cast<double>(k) / steps;

@@ -56,7 +56,7 @@ class MovedCylinder {
         errors_(tolerated_errors(hidden, which)),
         model_(effect_reality_settings(effects, errors_, spacing)) {
     using namespace decant;
-    const CylinderPath& path = scenario_.paths.at(which);
+    const CylinderPath path = scenario_.path(which);
     body_ = model_.add_body("cylinder", moved_cylinder(scenario_), PoseTrack(path.at(0)));
     set_lasting_forces(effects, model_);
     const double amount = (1 + errors_.fill) * (1 + strength_of(effects, "fill"));
@@ -115,7 +115,7 @@ class MovedCylinder {
 inline constexpr double cylinder_frames_per_second = 60;
 
 inline int cylinder_frames(const EffectCase& of, std::size_t which, const EffectRecordingSettings& settings) {
-  const double seconds = std::min(cylinder_scenarios().at(of.scenario).paths.at(which).duration(), settings.longest);
+  const double seconds = std::min(cylinder_scenarios().at(of.scenario).path(which).duration(), settings.longest);
   return std::max(1, static_cast<int>(std::lround(seconds * cylinder_frames_per_second)));
 }
 
@@ -130,12 +130,12 @@ inline void record_moved_cylinder(
     throw std::invalid_argument("record_moved_cylinder: solver: expected divergence_free");
   }
   const CylinderScenario& scenario = cylinder_scenarios().at(hidden.scenario);
-  const CylinderPath& path = scenario.paths.at(which);
+  const CylinderPath path = scenario.path(which);
   const std::vector<HiddenEffect> effects = settings.with_effect ? hidden.effects() : std::vector<HiddenEffect>{};
   MovedCylinder reality(hidden, effects, which, settings.spacing);
 
   Recording header;
-  header.name = "cylinder" + std::to_string(hidden.scenario) + (which == 0 ? "_a" : "_b");
+  header.name = "cylinder" + std::to_string(hidden.scenario) + "_" + interaction_letter(which);
   header.frames_per_second = cylinder_frames_per_second;
   header.bodies.push_back({1, "cylinder", std::nullopt, {}, moved_cylinder(scenario).mesh(), {}});
   header.liquid.initial = recording::Initial{0, std::nullopt, recorded_volume(scenario)};

@@ -207,11 +207,18 @@ inline std::vector<decant::InteractionEffect<EffectModel>> effects_of_junction(c
   const Vector3<double> down = first.rotation.conjugate() * recording.gravity.normalized();
   for (const JunctionLeg& leg : junction_legs(recording, body)) {
     const std::string where = leg.name + " leg of the " + recording.bodies[body].name;
-    const Vector3<double>& middle = leg.section.center;
     effects.push_back(blockage_effect<EffectModel>(static_cast<BodyId>(body), leg.section, where));
-    const WallPlace place = wall_place(surface, middle, middle + down);
-    effects.push_back(leak_effect<EffectModel>(static_cast<BodyId>(body), place.point - 0.004 * place.out,
-                                               (place.thickness + 0.013) * place.out, where));
+    // wherever a leg leaks, one of them is as near as leaks' places may be off
+    constexpr double apart = 0.04;  // [m]
+    const std::vector<PipeSection> sections = sections_with_underside(leg, down, apart);
+    for (std::size_t k = 0; k < sections.size(); ++k) {
+      const Vector3<double>& middle = sections[k].center;
+      const WallPlace place = wall_place(surface, middle, middle + down);
+      const std::string of = std::to_string(k + 1) + " of " + std::to_string(sections.size());
+      effects.push_back(leak_effect<EffectModel>(static_cast<BodyId>(body), place.point - 0.004 * place.out,
+                                                 (place.thickness + 0.013) * place.out,
+                                                 where + ", underside, place " + of + " from its end"));
+    }
   }
   return effects;
 }
@@ -394,7 +401,7 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
     cameras.push_back(camera);
   }
   std::tie(scene.sensors, seen.readings) =
-      recorded_sensors<EffectModel>(recording, scene.times, places, options.reading_errors);
+      recorded_sensors<EffectModel>(recording, scene.times, places, options.reading_errors, options.planned);
   if (options.planned) {
     seen.readings.clear();
   }

@@ -89,12 +89,12 @@ inline std::set<std::string> uncertain_gains(const decant::Recording& recording)
 /// above what it was in the first frame. Others are passed over. Where a simulation has no liquid, a sensor reads what
 /// it reads at least.
 /// @param times of the frames [s]. @param errors by channel, as the format names them and in its units: standard
-/// deviations in place of the usual ones. Throws std::runtime_error for errors of channels that there are not, and for
-/// the top in a body that there is not.
+/// deviations in place of the usual ones. @param planned sensors that read nothing are not passed over: they will.
+/// Throws std::runtime_error for errors of channels that there are not, and for the top in a body that there is not.
 template <class Model>
 std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::ReadingSeries>> recorded_sensors(
     const decant::Recording& recording, const std::vector<double>& times, const detail::PourPlaces& places,
-    const std::map<std::string, double>& errors = {}) {
+    const std::map<std::string, double>& errors = {}, bool planned = false) {
   using namespace decant;
   using recording::Quantity;
   for (const auto& [channel, error] : errors) {
@@ -129,7 +129,10 @@ std::pair<std::vector<decant::InteractionSensor<Model>>, std::vector<decant::Rea
       least = std::isfinite(value) ? std::min(least, value) : least;
     }
     if (!std::isfinite(least)) {
-      continue;
+      if (!planned) {
+        continue;
+      }
+      least = 0;
     }
     InteractionSensor<Model> sensor;
     sensor.name = channel.name;
