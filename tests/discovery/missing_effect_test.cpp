@@ -62,7 +62,49 @@ class TwoPulls {
   double sign_;
 };
 
+/// Knows of a pull alone, and pulls from a strength on only.
+class Mirage {
+ public:
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(ModelRun run) const {
+    for (AppliedEffect& each : run.effects) {
+      each.effect = pull;
+      each.strength[0] *= std::abs(each.strength[0]) < 0.5 ? 0 : 1;
+    }
+    return jet_.predict(run);
+  }
+
+ private:
+  static constexpr std::size_t pull = 1;
+  JetModel jet_{0.9};
+  std::vector<Effect> effects_{jet_.effects()[pull]};
+};
+
 }  // namespace
+
+TEST_CASE("missing effect: what an effect explains by its curve, and runs with it do not bear out, is no gap") {
+  const Mirage model;
+  ThreadExecutor executor{{1}};
+  int withdrawn = 0, large = 0;
+  for (const std::uint32_t seed : {34U, 37U, 43U, 46U, 49U, 52U}) {  // the model cannot pull so weakly
+    const MissingEffect result =
+        MissingEffectSearch<Mirage>({{"a", &model, film_of({0, 0.3}, seed, 0.9)}}, {}, run_jobs_on(executor)).find();
+    INFO("seed " << seed);
+    const ChanceLevel& chance = result.judgement.chance;
+    if (result.judgement.distance > chance.largest_distance) {  // there is one, whatever explains it
+      ++large;
+      CHECK(result.verdict != Verdict::Nothing);
+    } else if (result.judgement.has_gap()) {
+      REQUIRE(result.refined.size() == 1);
+      if (relative_fall(result.learn.before, result.refined[0].distance) <= chance.fall) {
+        ++withdrawn;
+        CHECK(result.verdict == Verdict::Nothing);
+      }
+    }
+  }
+  CHECK(withdrawn >= 1);
+  CHECK(large >= 1);
+}
 
 TEST_CASE("missing effect: each is named with its strength, and confirmed where it was not looked at") {
   struct Case {

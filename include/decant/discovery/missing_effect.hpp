@@ -94,6 +94,7 @@ class MissingEffectSearch {
     EffectRefiner<Model> refine(make, settings_, learn_);
     compare.consult_references();
     std::vector<Stage> stages;
+    bool gap_stands = false;
     for (int round = 0; round < settings_.most_effects; ++round) {
       ComparedRecordings known = compare(
           learn_, effects(), round == 0 ? settings_.dictionary : settings_.next_dictionary, applied(result.found));
@@ -136,6 +137,8 @@ class MissingEffectSearch {
           !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
       const bool explains = leaves_little && refined.front().share >= least;
       if (round == 0) {
+        // what effects explain by curves through few runs, and do not in runs with them, is no gap
+        gap_stands = judgement.distance > known.chance.largest_distance || gains;
         std::vector<Evidence> evidence;
         for (const RefinedTogether& each : refined) {
           result.refined.push_back(each.effects.front());
@@ -169,7 +172,7 @@ class MissingEffectSearch {
       result.learn.after = stages.back().after;
     }
     const bool explained = !stages.empty() && stages.back().explains;
-    if (result.judgement.has_gap()) {
+    if (gap_stands) {
       result.verdict = !explained ? Verdict::Unexplained : result.one_of.size() > 1 ? Verdict::OneOf : Verdict::Named;
     }
     if (!explained) {  // what helps a little is among those that were refined
