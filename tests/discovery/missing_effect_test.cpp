@@ -334,7 +334,8 @@ TEST_CASE("missing effect: what reality always does differently is learnt from r
 
 TEST_CASE("missing effect: references of other interactions say how far reality is from the model") {
   const double foreign = 2;  // [m/s^2]
-  const JetModel model(0.9), other(1.0);
+  // another container has other places for effects
+  const JetModel model(0.9), other(1.0, Vector3<double>(0.5, 0.6, 0));
   ThreadExecutor executor{{1}};
   std::vector<Interaction<JetModel>> references;
   for (const std::uint32_t seed : {62U, 63U, 64U}) {
