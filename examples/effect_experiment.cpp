@@ -87,7 +87,7 @@ int main(int count, char** values) {
       experiment.follow_advice(cases);
     }
     return example::tell_experiment(
-        {"What the model lacks", 2 * cases.size(), 3, reality_mm,
+        {"What the model lacks", experiment.recordings(cases), 3, reality_mm,
          decant::detail::number_text(model_mm) + " mm in the model. What is hidden is not told to the search."},
         experiment.folder(), example::effect_tables(experiment, cases), json_file, report_file);
   });

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -98,6 +99,20 @@ class EffectExperiment {
     return found == folder_.results().end() ? nullptr : &found->second;
   }
 
+  /// How many recordings cases take, those of which others were asked for included.
+  std::size_t recordings(const std::vector<EffectCase>& cases) const {
+    std::set<std::string> names;
+    for (const EffectCase& each : cases) {
+      for (std::size_t which = 0; which < (followed(each) == nullptr ? 2 : 2 + further_interactions); ++which) {
+        names.insert(recording_name(each, which));
+      }
+      for (int k = 0; k < options_.references; ++k) {
+        names.insert(reference(each, k).name);
+      }
+    }
+    return names.size();
+  }
+
   const ExperimentFolder& folder() const { return folder_; }
 
  private:
@@ -178,13 +193,10 @@ class EffectExperiment {
             {"longest_s", number_json(options_.recording.longest)}};
   }
 
-  /// @param planned see InteractionOptions.
-  std::unique_ptr<RecordedInteraction> interaction(const EffectCase& of, const std::string& name,
-                                                   bool planned = false) const {
+  std::unique_ptr<RecordedInteraction> interaction(const EffectCase& of, const std::string& name) const {
     InteractionOptions options = model_of_case(of);
     decant::Recording recording = decant::read_recording(folder_.recording(name));
     options.gain_of = uncertain_gains(recording);
-    options.planned = planned;
     return std::make_unique<RecordedInteraction>(recorded_interaction(std::move(recording), options));
   }
 
@@ -246,15 +258,12 @@ class EffectExperiment {
 
   nlohmann::json judge_with_further(const EffectCase& of) {
     Kept kept;
-    Interactions seen, proposed;
+    Interactions seen;
     for (std::size_t which = 0; which < 2 + further_interactions; ++which) {
       kept.push_back(interaction(of, recording_name(of, which)));
       seen.push_back(kept.back()->interaction(interaction_letter(which)));
-      if (which >= 2) {
-        kept.push_back(interaction(of, recording_name(of, which), true));
-        proposed.push_back(kept.back()->interaction(interaction_letter(which)));
-      }
     }
+    Interactions proposed(seen.begin() + 2, seen.end());  // advice looks at which frames and sensors there are, no more
     ScenarioRuns runs = runs_of(of);
     const decant::MissingEffect found = search(of, {seen[0]}, {seen[1]}, runs);
     const std::vector<decant::PossibleEffect> possible = decant::possible_effects(found, kept.front()->model.effects());

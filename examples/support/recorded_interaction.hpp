@@ -367,7 +367,7 @@ namespace detail {
 /// @param start see InteractionScene. @param most_fill see catalogue_of. @param sources what the model is made from.
 inline RecordedInteraction interaction_of(decant::Recording recording, const InteractionOptions& options,
                                           decltype(RecordedModel::Scene::start) start, std::optional<double> most_fill,
-                                          const std::vector<std::string>& sources) {
+                                          std::vector<std::string> sources) {
   using namespace decant;
   std::vector<std::size_t> frames = compared_frames(recording, options.frames_per_second);
   RecordedModel::Scene scene;
@@ -384,8 +384,11 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
   std::vector<std::size_t> cameras;
   for (std::size_t camera = 0; camera < recording.cameras.size(); ++camera) {
     auto series = seen_by(recording, camera, frames, options.model.cell_px);
-    if (!series && !options.planned) {
-      continue;
+    if (!series) {
+      if (!options.planned) {
+        continue;
+      }
+      sources.push_back("a picture by camera " + std::to_string(camera));  // which other models of it do not predict
     }
     const recording::Camera& of = recording.cameras[camera];
     InteractionCamera<DistortedPinholeCamera> one{camera_of(of.view(0), recording.width, recording.height), {}};
