@@ -19,8 +19,9 @@ using Periodic = decant::PeriodicParts<>;
 
 /// u = -cos(2 pi x) sin(2 pi z), w = sin(2 pi x) cos(2 pi z) at first, in a box of length 1 with `across` particles,
 /// until exp(-8 pi^2 t / Re) has taken it to 1/e; Re = 100.
+/// @param shift by how many spacings the lattice starts off the vortices' mirror planes, along x
 /// @return largest error of the amplitude on the way, over the exact one.
-double amplitude_error(int across) {
+double amplitude_error(int across, double shift) {
   const double reynolds = 100, spacing = 1.0 / across, k = 2 * std::numbers::pi, rate = 2 * k * k / reynolds;
   const int width = 6;
   decant::SimulatorSettings settings;
@@ -35,7 +36,7 @@ double amplitude_error(int across) {
     const double x = k * static_cast<double>(place.x()), z = k * static_cast<double>(place.z());
     return Vector(-std::cos(x) * std::sin(z), 0, std::sin(x) * std::cos(z));
   };
-  const auto places = decant_test::block<float>({0, 0, 0}, across, width, across, spacing);
+  const auto places = decant_test::block<float>({shift * spacing, 0, 0}, across, width, across, spacing);
   decant::PointArray<float> velocity(3, places.cols());
   for (Index i = 0; i < places.cols(); ++i) {
     velocity.col(i) = field(places.col(i)).cast<float>();
@@ -57,11 +58,22 @@ double amplitude_error(int across) {
   return worst;
 }
 
+/// Where a lattice breaks up is chance, and one as symmetric as the vortices breaks up by rounding alone, otherwise on
+/// every machine (12 to 14 % with 16 across): the mean of several starts is the method's error.
+double mean_amplitude_error(int across, int starts) {
+  double sum = 0;
+  for (int i = 0; i < starts; ++i) {
+    sum += amplitude_error(across, (i + 0.5) / starts);
+  }
+  return sum / starts;
+}
+
 }  // namespace
 
 TEST_CASE("Taylor-Green vortices of Re 100 decay as theory has it", "[slow]") {
-  // 12.6, 6.6 and 3.6 %, in proportion to the sub-step: most of it is energy that projecting the velocities takes
-  const double coarse = amplitude_error(16), middle = amplitude_error(32), fine = amplitude_error(64);
+  // 12.2, 7.0 and 3.1 %, in proportion to the sub-step: most of it is energy that projecting the velocities takes
+  const double coarse = mean_amplitude_error(16, 8), middle = mean_amplitude_error(32, 3),
+               fine = mean_amplitude_error(64, 1);
   CAPTURE(coarse, middle, fine);
   CHECK(middle < 0.6 * coarse);
   CHECK(fine < 0.6 * middle);
