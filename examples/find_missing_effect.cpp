@@ -63,7 +63,7 @@ int main(int count, char** values) {
   const example::SweepSession session;
   std::string json_file, report_file, journal_file;
   std::vector<std::string> learn_folders, held_out_folders, reference_folders, proposed_folders, tolerances,
-      reading_errors;
+      reading_errors, without;
   example::InteractionOptions options;
   decant::MissingEffectSettings settings;
   double usual_spacing_mm = 1e3 * options.model.spacing;
@@ -90,6 +90,8 @@ int main(int count, char** values) {
          "how far off the model may be and nothing is missing, such as latency=0.004 or body_pose=0.001, in the "
          "effect's unit; several by commas")
       ->delimiter(',');
+  app.add_option("--without", without, "effects that are known not to be missing, such as gravity; several by commas")
+      ->delimiter(',');
   app.add_option("--reading-error", reading_errors,
                  "standard deviations of what sensors read, a model of particles included, such as target_mass_g=2 or "
                  "level_mm=3, in the channel's unit; several by commas")
@@ -111,6 +113,7 @@ int main(int count, char** values) {
     example::expect_apart(learn_folders, held_out_folders, reference_folders);
     options.tolerances = numbers_by_name("--tolerance", tolerances, "latency=0.004");
     options.reading_errors = numbers_by_name("--reading-error", reading_errors, "target_mass_g=2");
+    options.without.insert(without.begin(), without.end());
     std::map<std::string, example::InteractionSource> sources;
     for (const auto* folders : {&learn_folders, &held_out_folders, &reference_folders, &proposed_folders}) {
       for (const std::string& folder : *folders) {

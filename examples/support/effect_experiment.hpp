@@ -78,9 +78,9 @@ class EffectExperiment {
   /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
   const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
 
-  /// For cases that leave several effects: asks which of the further interactions would tell them apart, and judges
-  /// again with that one as well, and with one that is drawn by chance. They are not learnt from, as that would take
-  /// simulations of all effects anew: what is left is told apart by how well it predicts them.
+  /// For cases that leave several effects: asks which of the further interactions would tell them apart, and learns
+  /// again from that one as well, and from one that is drawn by chance. These take simulations of all effects anew,
+  /// which all cases of the scenario that ask for the same one share.
   void follow_advice(const std::vector<EffectCase>& cases) {
     std::vector<ExperimentJob> jobs;
     for (const EffectCase& each : cases) {
@@ -278,7 +278,7 @@ class EffectExperiment {
         decant::advise_next_interaction(possible, std::move(proposed), found.learn, jobs_of(runs), search_of(of));
     const std::size_t by_chance = detail::mixed_seed({of.seed, 31U}) % further_interactions;
     for (const auto& [key, which] : {std::pair{"after_advised", advice.front().which}, {"after_drawn", by_chance}}) {
-      const decant::MissingEffect after = search(of, {seen[0]}, {seen[1], seen[2 + which]}, runs);
+      const decant::MissingEffect after = search(of, {seen[0], seen[2 + which]}, {seen[1]}, runs);
       nlohmann::json& told = json[key] = missing_effect_json(after.judged, after, kept[0]->recording.gravity);
       told["interaction"] = interaction_letter(2 + which);
       told["truth"] = folder_.truth(recording_name(of, 0));

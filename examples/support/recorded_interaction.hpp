@@ -48,6 +48,7 @@ struct InteractionOptions {
   double frames_per_second = 15;  ///< of those of the recording that are compared
   decant::SimulatedInteractionSettings model{};
   std::map<std::string, double> tolerances{};  ///< by effect: of each of its components, in place of the catalogue's
+  std::set<std::string> without{};             ///< effects that are known not to be missing, beyond their tolerances
   std::map<std::string, double> reading_errors{};  ///< see recorded_sensors
   /// Kinds of sensors that may show too much or too little: the same for all recordings of a search, see
   /// uncertain_gains.
@@ -433,6 +434,18 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
     }
     if (!found) {
       throw std::runtime_error("tolerance of '" + name + "': expected an effect of the catalogue of " + recording.name);
+    }
+  }
+  for (const std::string& name : options.without) {
+    bool found = false;
+    for (auto& effect : catalogue) {
+      if (effect.name == name) {
+        found = true;
+        effect.kind = effect.kind == EffectKind::Nuisance ? effect.kind : EffectKind::Tolerated;  // which is not named
+      }
+    }
+    if (!found) {
+      throw std::runtime_error("without '" + name + "': expected an effect of the catalogue of " + recording.name);
     }
   }
   RecordedModel model(std::move(scene), std::move(catalogue), options.model);

@@ -127,6 +127,17 @@ TEST_CASE("effect dictionary: runs to both sides of each component, templates fo
   CHECK(of_two == std::set<std::pair<double, double>>{
                       {-1, 0}, {-0.5, 0}, {0.5, 0}, {1, 0}, {0, -1}, {0, -0.5}, {0, 0.5}, {0, 1}});
 
+  // what is known not to be missing is drawn, but has no runs of its own, and the others are the same ones
+  effects[1].kind = EffectKind::Tolerated;
+  std::set<std::string> fewer;
+  for (const PlannedRun& each : plan_dictionary(effects, settings)) {
+    CHECK((each.role != RunRole::Effect || each.effect == 0));
+    fewer.insert(run_key(effects, each.run));
+  }
+  CHECK(fewer.size() == keys.size() - 8);
+  CHECK(std::includes(keys.begin(), keys.end(), fewer.begin(), fewer.end()));
+  effects[1].kind = EffectKind::Physics;
+
   // around a model that has been given something already, which runs about that replace
   const std::vector<AppliedEffect> added{{0, Eigen::VectorXd::Constant(1, 3), {}}};
   for (const PlannedRun& each : plan_dictionary(effects, settings, added)) {

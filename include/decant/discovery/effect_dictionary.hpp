@@ -42,8 +42,9 @@ struct DictionarySettings {
   std::vector<double> shares{0.35, 1.0};  ///< of the range to each side of an effect's base, in (0, 1]; at least one
 };
 
-/// The runs for all effects. Seeds follow from the run's number in its role, so that runs of one model and settings are
-/// the same ones whatever recording they are compared with.
+/// The runs for all effects that are looked for. Seeds follow from the run's number in its role, so that runs of one
+/// model and settings are the same ones whatever recording they are compared with; those of effects that are only
+/// tolerated are counted as well, so that the others are the same ones whatever is looked for.
 /// @param added effects that the model has been given already: all runs have them, but for those that are about one of
 /// them. Throws std::invalid_argument if settings are out of range.
 inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effects,
@@ -84,9 +85,13 @@ inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effect
       }
       for (const double end : {of.low, of.high}) {
         for (const double share : settings.shares) {
-          if (end != of.base) {
-            add(RunRole::Effect, of.base + share * (end - of.base), seed++);
+          if (end == of.base) {
+            continue;
           }
+          if (effect.kind != EffectKind::Tolerated) {
+            add(RunRole::Effect, of.base + share * (end - of.base), seed);
+          }
+          ++seed;
         }
       }
     }

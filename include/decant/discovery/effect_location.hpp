@@ -54,7 +54,8 @@ std::vector<AppliedEffect> located_effects(const std::vector<const Model*>& mode
   std::map<std::string, std::pair<double, AppliedEffect>> nearest;  // by name, with how far off that is
   for (std::size_t k = 0; k < effects.size(); ++k) {
     const Effect& effect = effects[k];
-    if (effect.seen_first == SeenFirst::Nothing || effect.place_tolerance == 0) {
+    if (effect.seen_first == SeenFirst::Nothing || effect.place_tolerance == 0 ||
+        effect.kind == EffectKind::Tolerated) {
       continue;
     }
     const Disagreement* onset = nullptr;
