@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // What sensors read that give one number at a time, as evidence of what a model lacks.
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -48,7 +49,54 @@ MissingEffect found_in_tank(const Tank& tank, std::uint32_t seed) {
   return search.find();
 }
 
+/// A front passes a level probe after a second. Knows of fronts that are earlier or later by up to more than how long
+/// anything is read, and of a hollow that follows the front.
+class Front {
+ public:
+  Front() {
+    for (const auto& [name, component] : {std::pair{"late", EffectComponent{"", 0, -0.9, 1.2, 0.004}},
+                                          std::pair{"hollow", EffectComponent{"", 0, 0, 1.5, 0.01}}}) {
+      effects_.push_back(plain_effect(name, "", "", "", component));
+    }
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<ReadingSeries> predict(const ModelRun& run) const {
+    std::mt19937 random(run.seed);
+    const std::vector<AppliedEffect> as = effects_of_run(effects_, run, random);
+    return passing(as[0].strength[0], as[1].strength[0]);
+  }
+  static std::vector<ReadingSeries> passing(double late, double hollow) {
+    ReadingSeries read("level [m]", {0.02, 0});
+    for (int k = 0; k <= 80; ++k) {
+      const double time = 0.02 * k;
+      const bool behind = time > 1.05 + late && time < 1.4 + late;
+      read.add(time, std::clamp((time - 1 - late) / 0.1, 0.0, 1.0) - (behind ? hollow : 0));
+    }
+    return {read};
+  }
+
+ private:
+  std::vector<Effect> effects_{};
+};
+
 }  // namespace
+
+TEST_CASE("readings: what one run of a dictionary shows is looked at, though a curve through all of them does not") {
+  // one of its runs is 0.42 late, but what fronts do that are as much earlier, and much later, is not in line with that
+  const Front model;
+  ThreadExecutor executor{{1}};
+  MissingEffectSettings settings;
+  settings.refined = 1;
+  for (const std::uint32_t seed : {3U, 5U}) {
+    const Observation seen = Observation(Front::passing(0.4, 0)).with_errors(seed);
+    const MissingEffect result =
+        MissingEffectSearch<Front>({{"a", &model, seen}}, {}, run_jobs_on(executor), settings).find();
+    CHECK(result.judgement.standings.front().effect == 1);  // by curves the hollow explains more
+    REQUIRE(result.verdict == Verdict::Named);
+    CHECK(model.effects()[result.found.front().effect].name == "late");
+    CHECK(result.found.front().strength[0] == Approx(0.4).margin(0.01));
+  }
+}
 
 TEST_CASE("readings: errors have the deviation they are said to have, and last as long") {
   for (const double lasts : {0.0, 0.5}) {

@@ -124,22 +124,46 @@ class EffectRefiner {
     bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
   };
 
+  /// A run with an effect, and what is left with it.
+  struct NearestRun {
+    Eigen::VectorXd strength;
+    double distance = 0;
+  };
+
+  /// The run of the dictionary with an effect that is nearest to what was recorded; none where none worked.
+  static std::optional<NearestRun> nearest_run(std::size_t effect, const ComparedRecordings& known) {
+    std::optional<NearestRun> nearest;
+    for (const std::size_t run : known.dictionary.front().of_effect(effect)) {
+      std::vector<Observation> seen;
+      for (const EffectDictionary& each : known.dictionary) {
+        seen.push_back(each.seen[run]);
+      }
+      const double distance = distance_left(known.recorded, seen).value;
+      if (std::isfinite(distance) && (!nearest || distance < nearest->distance)) {
+        nearest = NearestRun{known.dictionary.front().strength(run), distance};
+      }
+    }
+    return nearest;
+  }
+
   /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places two of
-  /// them, by evidence. What lasts for a while explains more by chance than what lasts.
+  /// them, by evidence. What lasts for a while explains more by chance than what lasts. Where what an effect does is
+  /// bent, as a front's is that comes later, a curve through few runs promises less than one of them has: answers that
+  /// come near the best by such a run are looked at from there on, although no curve has them among the best.
   std::vector<Candidate> chosen(const Judgement& judgement, const ComparedRecordings& known,
                                 const std::vector<RefinedEffect>& found) const {
     struct Instance {
       Candidate candidate;
-      double evidence;
+      double distance;  ///< that is left by the curve
+      double evidence;  ///< of it
+      std::optional<NearestRun> run;
     };
     std::map<std::string, std::vector<Instance>> of_answer;
     std::vector<std::string> order;  // of answers, by vote, as often as each has an effect
     for (const EffectStanding& standing : judgement.standings) {
       const Effect& effect = known.effects[standing.effect];
       const std::size_t number = known.number[standing.effect];
-      const bool is_found =
-          std::any_of(found.begin(), found.end(), [&](const RefinedEffect& other) { return other.effect == number; });
-      if (is_found || !(standing.improvement > 0)) {
+      if (std::any_of(found.begin(), found.end(), [&](const auto& other) { return other.effect == number; })) {
         continue;
       }
       Candidate candidate;
@@ -151,27 +175,54 @@ class EffectRefiner {
       candidate.point = candidate.point.rounded();
       const double evidence =
           evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(candidate.point.size());
-      of_answer[effect.answer()].push_back({std::move(candidate), evidence});
-      order.push_back(effect.answer());
+      of_answer[effect.answer()].push_back(
+          {std::move(candidate), standing.distance, evidence, nearest_run(standing.effect, known)});
+      if (standing.improvement > 0) {
+        order.push_back(effect.answer());
+      }
     }
-    std::map<std::string, std::size_t> taken;
-    std::vector<Candidate> result;
     for (auto& [answer, instances] : of_answer) {
       std::stable_sort(instances.begin(), instances.end(),
                        [](const auto& a, const auto& b) { return a.evidence > b.evidence; });
     }
+    std::map<std::string, std::size_t> taken;
+    std::vector<Candidate> result;
+    double best = std::numeric_limits<double>::infinity();
     for (const std::string& answer : order) {
-      std::vector<Instance>& instances = of_answer[answer];
+      const std::vector<Instance>& instances = of_answer[answer];
       const std::size_t next = taken[answer];
-      if (result.size() == static_cast<std::size_t>(settings_.refined) || next == instances.size()) {
-        continue;
-      }
-      if (next < (known.effects[instances[next].candidate.judged].place ? 2U : 1U)) {
-        result.push_back(std::move(instances[next].candidate));
+      if (result.size() < static_cast<std::size_t>(settings_.refined) && next < instances.size() &&
+          next < (known.effects[instances[next].candidate.judged].place ? 2U : 1U)) {
+        best = std::min(best, instances[next].distance);
+        result.push_back(instances[next].candidate);
         ++taken[answer];
       }
     }
+    for (const auto& [answer, instances] : of_answer) {
+      if (taken[answer] > 0) {
+        continue;
+      }
+      const auto by_run = [](const Instance& each) {
+        return each.run ? each.run->distance : std::numeric_limits<double>::infinity();
+      };
+      const Instance& nearest =
+          *std::min_element(instances.begin(), instances.end(),
+                            [&](const Instance& a, const Instance& b) { return by_run(a) < by_run(b); });
+      const bool bent = relative_fall(nearest.distance, by_run(nearest)) > known.chance.fall;
+      if (bent && comes_near(by_run(nearest), best, known.chance)) {
+        Candidate& candidate = result.emplace_back(nearest.candidate);
+        const auto [begin, count] = candidate.point.strength_of(found.size());
+        for (Eigen::Index k = 0; k < count; ++k) {
+          candidate.point = candidate.point.with(begin + k, nearest.run->strength[k]);
+        }
+      }
+    }
     return result;
+  }
+
+  /// Whether an effect that leaves so much may yet be the best one.
+  static bool comes_near(double distance, double best, const ChanceLevel& chance) {
+    return relative_fall(distance, best) < 3 * chance.fall;
   }
 
   /// Leaves the best one, the next best one as its rival, and all others that may come near it.
@@ -183,7 +234,7 @@ class EffectRefiner {
     std::sort(sorted.begin(), sorted.end());
     const double rival = sorted[std::min<std::size_t>(1, sorted.size() - 1)];
     std::erase_if(candidates, [&](const Candidate& each) {
-      return each.expected > rival && relative_fall(each.expected, sorted.front()) >= 3 * chance.fall;
+      return each.expected > rival && !comes_near(each.expected, sorted.front(), chance);
     });
   }
 
