@@ -422,31 +422,31 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
     }
     catalogue.push_back(sensor_gain_effect<EffectModel>(std::move(sensors), kind));
   }
-  for (const auto& [name, tolerance] : options.tolerances) {
+  const auto change = [&](const std::string& option, const std::string& name, const auto& apply) {
     bool found = false;
     for (auto& effect : catalogue) {
       if (effect.name == name) {
         found = true;
-        for (EffectComponent& component : effect.components) {
-          component.tolerance = tolerance;
-        }
+        apply(effect);
       }
     }
     if (!found) {
-      throw std::runtime_error("tolerance of '" + name + "': expected an effect of the catalogue of " + recording.name);
+      throw std::runtime_error(option + " '" + name + "': expected an effect of the catalogue of " + recording.name);
     }
+  };
+  for (const auto& [name, tolerance] : options.tolerances) {
+    change("tolerance of", name, [tolerance = tolerance](Effect& effect) {
+      for (EffectComponent& component : effect.components) {
+        component.tolerance = tolerance;
+      }
+    });
   }
   for (const std::string& name : options.without) {
-    bool found = false;
-    for (auto& effect : catalogue) {
-      if (effect.name == name) {
-        found = true;
-        effect.kind = effect.kind == EffectKind::Nuisance ? effect.kind : EffectKind::Tolerated;  // which is not named
+    change("without", name, [](Effect& effect) {
+      if (effect.kind != EffectKind::Nuisance) {  // which are never named
+        effect.kind = EffectKind::Tolerated;
       }
-    }
-    if (!found) {
-      throw std::runtime_error("without '" + name + "': expected an effect of the catalogue of " + recording.name);
-    }
+    });
   }
   RecordedModel model(std::move(scene), std::move(catalogue), options.model);
   std::string of_model = fingerprint(sources, model);

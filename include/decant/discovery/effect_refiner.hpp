@@ -126,21 +126,21 @@ class EffectRefiner {
 
   /// A run with an effect, and what is left with it.
   struct NearestRun {
-    Eigen::VectorXd strength;
-    double distance = 0;
+    Eigen::VectorXd strength{};
+    double distance = std::numeric_limits<double>::infinity();
   };
 
-  /// The run of the dictionary with an effect that is nearest to what was recorded; none where none worked.
-  static std::optional<NearestRun> nearest_run(std::size_t effect, const ComparedRecordings& known) {
-    std::optional<NearestRun> nearest;
+  /// The run of the dictionary with an effect that is nearest to what was recorded; infinitely far where none worked.
+  static NearestRun nearest_run(std::size_t effect, const ComparedRecordings& known) {
+    NearestRun nearest;
     for (const std::size_t run : known.dictionary.front().of_effect(effect)) {
       std::vector<Observation> seen;
       for (const EffectDictionary& each : known.dictionary) {
         seen.push_back(each.seen[run]);
       }
       const double distance = distance_left(known.recorded, seen).value;
-      if (std::isfinite(distance) && (!nearest || distance < nearest->distance)) {
-        nearest = NearestRun{known.dictionary.front().strength(run), distance};
+      if (distance < nearest.distance) {
+        nearest = {known.dictionary.front().strength(run), distance};
       }
     }
     return nearest;
@@ -156,7 +156,6 @@ class EffectRefiner {
       Candidate candidate;
       double distance;  ///< that is left by the curve
       double evidence;  ///< of it
-      std::optional<NearestRun> run;
     };
     std::map<std::string, std::vector<Instance>> of_answer;
     std::vector<std::string> order;  // of answers, by vote, as often as each has an effect
@@ -175,8 +174,7 @@ class EffectRefiner {
       candidate.point = candidate.point.rounded();
       const double evidence =
           evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(candidate.point.size());
-      of_answer[effect.answer()].push_back(
-          {std::move(candidate), standing.distance, evidence, nearest_run(standing.effect, known)});
+      of_answer[effect.answer()].push_back({std::move(candidate), standing.distance, evidence});
       if (standing.improvement > 0) {
         order.push_back(effect.answer());
       }
@@ -187,7 +185,7 @@ class EffectRefiner {
     }
     std::map<std::string, std::size_t> taken;
     std::vector<Candidate> result;
-    double best = std::numeric_limits<double>::infinity();
+    double best = judgement.distance;
     for (const std::string& answer : order) {
       const std::vector<Instance>& instances = of_answer[answer];
       const std::size_t next = taken[answer];
@@ -202,18 +200,21 @@ class EffectRefiner {
       if (taken[answer] > 0) {
         continue;
       }
-      const auto by_run = [](const Instance& each) {
-        return each.run ? each.run->distance : std::numeric_limits<double>::infinity();
-      };
-      const Instance& nearest =
-          *std::min_element(instances.begin(), instances.end(),
-                            [&](const Instance& a, const Instance& b) { return by_run(a) < by_run(b); });
-      const bool bent = relative_fall(nearest.distance, by_run(nearest)) > known.chance.fall;
-      if (bent && comes_near(by_run(nearest), best, known.chance)) {
-        Candidate& candidate = result.emplace_back(nearest.candidate);
+      NearestRun run;
+      const Instance* with = nullptr;
+      for (const Instance& each : instances) {
+        NearestRun other = nearest_run(each.candidate.judged, known);
+        if (other.distance < run.distance) {
+          run = std::move(other);
+          with = &each;
+        }
+      }
+      const bool bent = with != nullptr && relative_fall(with->distance, run.distance) > known.chance.fall;
+      if (bent && comes_near(run.distance, best, known.chance)) {
+        Candidate& candidate = result.emplace_back(with->candidate);
         const auto [begin, count] = candidate.point.strength_of(found.size());
         for (Eigen::Index k = 0; k < count; ++k) {
-          candidate.point = candidate.point.with(begin + k, nearest.run->strength[k]);
+          candidate.point = candidate.point.with(begin + k, run.strength[k]);
         }
       }
     }
