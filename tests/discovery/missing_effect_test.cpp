@@ -80,6 +80,18 @@ class Mirage {
   std::vector<Effect> effects_{jet_.effects()[pull]};
 };
 
+/// Knows that there is no tap.
+class WithoutTap : public LocatingJetModel {
+ public:
+  WithoutTap(double angle, const Vector3<double>& usual) : LocatingJetModel(angle, usual) {
+    effects_.back().kind = EffectKind::Tolerated;
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+
+ private:
+  std::vector<Effect> effects_{LocatingJetModel::effects()};
+};
+
 }  // namespace
 
 TEST_CASE("missing effect: what an effect explains by its curve, and runs with it do not bear out, is no gap") {
@@ -271,6 +283,9 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
     CHECK(tap.place->x() == Approx(0.3).margin(0.04));  // a third of the squares that are compared
     CHECK(tap.place->y() == Approx(0.65).margin(0.04));
     CHECK(tap.strength[0] == Approx(25).epsilon(0.2));
+    const MissingEffect other = found(WithoutTap(0.9, usual), seed);
+    CHECK(other.verdict == Verdict::Unexplained);
+    CHECK(other.judged.size() == 6);  // none where the recording begins to disagree
   }
 }
 
