@@ -121,6 +121,7 @@ int main(int count, char** values) {
         options.gain_of.merge(example::uncertain_gains(example::recording_of(sources[folder])));
       }
     }
+    options.names = example::names_by_role(example::recording_of(sources[learn_folders.front()]));
     if (const auto* scene = std::get_if<example::MeasuredScene>(&sources[learn_folders.front()])) {
       usual_spacing_mm = 1e3 * scene->scene.spacing;
     }

@@ -197,6 +197,7 @@ class EffectExperiment {
     InteractionOptions options = model_of_case(of);
     decant::Recording recording = decant::read_recording(folder_.recording(name));
     options.gain_of = uncertain_gains(recording);
+    options.names = names_by_role(decant::read_recording(folder_.recording(recording_name(of, 0))));
     return std::make_unique<RecordedInteraction>(recorded_interaction(std::move(recording), options));
   }
 

@@ -53,12 +53,38 @@ struct InteractionOptions {
   /// Kinds of sensors that may show too much or too little: the same for all recordings of a search, see
   /// uncertain_gains.
   std::set<std::string> gain_of{};
+  /// What effects' words call bodies, by role, in order: as the first recording of a search does, so that all of them
+  /// know an effect by the same words. By their own names where there is none.
+  std::map<std::optional<decant::recording::Role>, std::vector<std::string>> names{};
   /// Not what was seen, but what would be: each camera is there, with or without pictures, and what was seen or read is
   /// left out.
   bool planned = false;
 };
 
+inline std::map<std::optional<decant::recording::Role>, std::vector<std::string>> names_by_role(
+    const decant::Recording& recording) {
+  std::map<std::optional<decant::recording::Role>, std::vector<std::string>> names;
+  for (const decant::recording::Body& body : recording.bodies) {
+    names[body.role].push_back(body.name);
+  }
+  return names;
+}
+
 namespace detail {
+
+/// Of a recording's bodies, see InteractionOptions::names.
+inline std::vector<std::string> names_in_words(
+    const decant::Recording& recording,
+    const std::map<std::optional<decant::recording::Role>, std::vector<std::string>>& names) {
+  std::map<std::optional<decant::recording::Role>, std::size_t> before;
+  std::vector<std::string> result;
+  for (const decant::recording::Body& body : recording.bodies) {
+    const std::size_t number = before[body.role]++;
+    const auto of_role = names.find(body.role);
+    result.push_back(of_role != names.end() && number < of_role->second.size() ? of_role->second[number] : body.name);
+  }
+  return result;
+}
 
 inline std::string text_of_file(const std::filesystem::path& file) {
   return decant::detail::read_text_file(file, std::uintmax_t{1} << 30);
@@ -198,16 +224,17 @@ inline bool moves(const decant::Recording& recording) {
   return std::any_of(recording.bodies.begin(), recording.bodies.end(), moves_on);
 }
 
-/// What pipes may do: each way out of a junction may be blocked in part, or leak.
+/// What pipes may do: each way out of a junction may be blocked in part, or leak. @param name of the body in words.
 inline std::vector<decant::InteractionEffect<EffectModel>> effects_of_junction(const decant::Recording& recording,
-                                                                               std::size_t body) {
+                                                                               std::size_t body,
+                                                                               const std::string& name) {
   using namespace decant;
   std::vector<InteractionEffect<EffectModel>> effects;
   const BoundingVolumeHierarchy surface(recording.bodies[body].mesh);
   const Pose first = recording.bodies[body].motion.at(recording.timestamps.front());
   const Vector3<double> down = first.rotation.conjugate() * recording.gravity.normalized();
   for (const JunctionLeg& leg : junction_legs(recording, body)) {
-    const std::string where = leg.name + " leg of the " + recording.bodies[body].name;
+    const std::string where = leg.name + " leg of the " + name;
     effects.push_back(blockage_effect<EffectModel>(static_cast<BodyId>(body), leg.section, where));
     // wherever a leg leaks, one of them is as near as leaks' places may be off
     constexpr double apart = 0.04;  // [m]
@@ -225,10 +252,11 @@ inline std::vector<decant::InteractionEffect<EffectModel>> effects_of_junction(c
 }
 
 /// The catalogue, as far as it applies to a recording. @param most_fill how much more liquid there may be at most, over
-/// what is assumed; nothing where that is not asked.
+/// what is assumed; nothing where that is not asked. @param names of the bodies in words.
 inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const decant::Recording& recording,
                                                                         const PourPlaces& places,
-                                                                        std::optional<double> most_fill) {
+                                                                        std::optional<double> most_fill,
+                                                                        const std::vector<std::string>& names) {
   using namespace decant;
   auto effects = force_effects<EffectModel>(recording.liquid.viscosity / recording.liquid.density, recording.gravity);
   const Vector3<double> up = -recording.gravity.normalized();
@@ -245,7 +273,7 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
     const recording::Body& body = recording.bodies[k];
     if (body.role == recording::Role::Junction) {
-      for (auto& effect : effects_of_junction(recording, k)) {
+      for (auto& effect : effects_of_junction(recording, k, names[k])) {
         of_bodies.push_back(std::move(effect));
       }
       continue;
@@ -265,13 +293,13 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
     }
     const auto id = static_cast<BodyId>(k);
     effects.push_back(leak_effect<EffectModel>(id, inside->floor + 0.003 * inside->up, (lowest - 0.009) * inside->up,
-                                               "floor of the " + body.name));
+                                               "floor of the " + names[k]));
     constexpr double half = 0.01;  // of an obstacle of middling size [m]
     if (source) {
       // on the wall below where liquid leaves
       const Vector3<double> in = (inside->mouth() - places.lip).normalized();
       of_bodies.push_back(
-          obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + body.name));
+          obstacle_effect<EffectModel>(id, places.lip + half * (in - inside->up), "mouth of the " + names[k]));
       // where liquid is while it is poured: holes of other heights let out jets that do not overlap
       const double wall = inside->up.dot(places.lip - inside->floor);
       const BoundingVolumeHierarchy surface(body.mesh);
@@ -280,16 +308,16 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
         const Vector3<double> lower = (1 - share) * wall * inside->up;
         const WallPlace place = wall_place(surface, inside->mouth() - lower, places.lip - lower);
         of_bodies.push_back(leak_effect<EffectModel>(id, place.point - 0.004 * place.out,
-                                                     (place.thickness + 0.013) * place.out, where + body.name));
+                                                     (place.thickness + 0.013) * place.out, where + names[k]));
       }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(
-            {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, body.name));
+            {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, names[k]));
       }
     } else {
       effects.push_back(loss_effect<EffectModel>(id, inside->middle,
                                                  0.5 * BoundingVolumeHierarchy(body.mesh).bounds().diagonal().norm(),
-                                                 "in the " + body.name));
+                                                 "in the " + names[k]));
       const double out = 0.45 * inside->rim_radius();
       for (const auto& [where, off] : std::initializer_list<std::pair<const char*, Vector3<double>>>{
                {"above the ", Vector3<double>::Zero()},
@@ -298,10 +326,10 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
                {"behind, above the ", out * along},
                {"in front, above the ", -out * along}}) {
         effects.push_back(inflow_effect<EffectModel>(first * inside->middle + 0.08 * up + off,
-                                                     static_cast<Origin>(recording.bodies.size()), where + body.name,
+                                                     static_cast<Origin>(recording.bodies.size()), where + names[k],
                                                      TimeWindow{.from = begin + 0.3 * seconds}, 0.3 * seconds));
       }
-      of_bodies.push_back(obstacle_effect<EffectModel>(id, inside->floor + half * inside->up, "in the " + body.name));
+      of_bodies.push_back(obstacle_effect<EffectModel>(id, inside->floor + half * inside->up, "in the " + names[k]));
     }
   }
   if (most_fill) {
@@ -312,7 +340,7 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   }
   effects.push_back(moves(recording) ? latency_effect<EffectModel>() : late_start_effect<EffectModel>());
   for (std::size_t body = 0; body < recording.bodies.size(); ++body) {
-    effects.push_back(body_pose_effect<EffectModel>(body, recording.bodies[body].name));
+    effects.push_back(body_pose_effect<EffectModel>(body, names[body]));
   }
   if (!recording.cameras.empty()) {
     for (auto& effect : camera_effects<EffectModel>()) {
@@ -412,7 +440,7 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
   if (scene.cameras.empty() && scene.sensors.empty()) {
     throw std::runtime_error(recording.name + ": expected masks or measurements to compare a model with");
   }
-  auto catalogue = catalogue_of(recording, places, most_fill);
+  auto catalogue = catalogue_of(recording, places, most_fill, names_in_words(recording, options.names));
   for (const std::string& kind : options.gain_of) {
     std::vector<std::size_t> sensors;
     for (std::size_t sensor = 0; sensor < scene.sensors.size(); ++sensor) {

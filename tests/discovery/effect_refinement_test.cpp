@@ -138,3 +138,72 @@ TEST_CASE("refinement: one step finds what is linear, in several recordings toge
   features[1] += views[1].slope * numbers({100, 0});
   CHECK(refinement(point, views, features)[0] == Approx(2 * point.step(0)));
 }
+
+TEST_CASE("refinement: chaos in slopes makes steps shorter, unless it is taken off") {
+  const Effect drag = named("drag", {{"", 0, 0, 4}});
+  EffectPoint point;
+  point.add(drag, 0, {0, numbers({1})}, numbers({0.5}));
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal(0, 1);
+  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
+  };
+  NuisanceSample sample;
+  sample.baseline = draw(400, 4);
+  sample.draws = draw(400, 40);
+  const NuisanceSpace space(sample);
+  // a slope that is half effect and half chaos, of each of which the size is known
+  const Eigen::VectorXd slope = draw(400, 1);
+  const double chaos = space.distance(space.standardised_difference(draw(400, 1)));
+  const double move = 0.4;
+  double as_it_is = 0, without_chaos = 0;
+  constexpr int repeats = 200;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    RefinementView view{&space, draw(400, 1), slope + draw(400, 1)};
+    const Eigen::VectorXd seen = view.middle + slope * move;
+    view.chaos = numbers({chaos});
+    as_it_is += refinement(point, {view}, {seen})[0] / repeats;
+    without_chaos += refinement(point, {view}, {seen}, true)[0] / repeats;
+  }
+  CHECK(as_it_is == Approx(0.5 * move).epsilon(0.1));
+  CHECK(without_chaos == Approx(move).epsilon(0.1));
+}
+
+TEST_CASE("refinement: of two effects that do nearly the same, their sum is told where each is not") {
+  const Effect drag = named("drag", {{"", 0, 0, 4}}), other = named("other", {{"", 0, 0, 4}});
+  EffectPoint point;
+  point.add(drag, 0, {0, numbers({1})}, numbers({0.5}));
+  point.add(other, 1, {1, numbers({1})}, numbers({0.5}));
+  std::mt19937 random(12);
+  std::normal_distribution<double> normal(0, 1);
+  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
+  };
+  NuisanceSample sample;
+  sample.baseline = draw(400, 4);
+  sample.draws = draw(400, 40);
+  const NuisanceSpace space(sample);
+  Eigen::MatrixXd slope = draw(400, 2);
+  slope.col(1) = slope.col(0) + 0.1 * slope.col(1);
+  const double chaos = space.distance(space.standardised_difference(draw(400, 1)));
+  double sum = 0, largest = 0;
+  constexpr int repeats = 200;
+  for (int repeat = 0; repeat < repeats; ++repeat) {
+    RefinementView view{&space, draw(400, 1), slope + draw(400, 2)};
+    view.chaos = numbers({chaos, chaos});
+    const Eigen::VectorXd move = refinement(point, {view}, {view.middle + slope * numbers({0.2, 0.2})}, true);
+    sum += move.sum() / repeats;
+    largest = std::max(largest, move.cwiseAbs().maxCoeff());
+  }
+  CHECK(sum == Approx(0.4).epsilon(0.1));
+  CHECK(largest < 0.5);  // without any bound on what is taken off, far beyond
+}
+
+TEST_CASE("effect point: what is faint is tried farther off") {
+  const Effect drag = named("drag", {{"", 0, 0, 4}});
+  EffectPoint point;
+  point.add(drag, 0, {0, numbers({1})}, numbers({1.5}));
+  CHECK(point.step(0) == Approx(1.5));
+  CHECK(point.with(0, 6).step(0) == Approx(1.8));  // three tenths of the strength
+  CHECK_THROWS_WITH(point.add(drag, 0, {0, numbers({1})}, numbers({1, 2})), decant_test::contains("least steps"));
+}

@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <decant/discovery/missing_effect.hpp>
@@ -80,6 +82,58 @@ class Mirage {
   std::vector<Effect> effects_{jet_.effects()[pull]};
 };
 
+/// Knows of drag, and of pulls that hardly change anything.
+class Faint {
+ public:
+  Faint() {
+    effects_.resize(2);
+    effects_[1].components = {{"", 0, -0.04, 0.04}};
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const { return jet_.predict(run); }
+
+ private:
+  JetModel jet_{0.9};
+  std::vector<Effect> effects_{jet_.effects()};
+};
+
+/// Knows of effects in reverse order, and calls them what it is told to.
+class Backwards {
+ public:
+  explicit Backwards(double angle, const std::string& prefix = "") : jet_(angle) {
+    std::reverse(effects_.begin(), effects_.end());
+    for (Effect& effect : effects_) {
+      effect.name = prefix + effect.name;
+    }
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(ModelRun run) const {
+    for (AppliedEffect& each : run.effects) {
+      each.effect = effects_.size() - 1 - each.effect;
+    }
+    return jet_.predict(run);
+  }
+
+ private:
+  JetModel jet_;
+  std::vector<Effect> effects_{jet_.effects()};
+};
+
+/// One or the other of two models, by pointer.
+class Either {
+ public:
+  explicit Either(const LocatingJetModel& with) : with_(&with) {}
+  explicit Either(const Backwards& without) : without_(&without) {}
+  const std::vector<Effect>& effects() const noexcept { return with_ ? with_->effects() : without_->effects(); }
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    return with_ ? with_->predict(run) : without_->predict(run);
+  }
+
+ private:
+  const LocatingJetModel* with_ = nullptr;
+  const Backwards* without_ = nullptr;
+};
+
 /// Knows that there is no tap.
 class WithoutTap : public LocatingJetModel {
  public:
@@ -126,28 +180,67 @@ TEST_CASE("missing effect: each is named with its strength, and confirmed where 
   };
   const std::vector<Case> cases{
       {{0.5, 0}, "drag", 0.5}, {{0, 0.9}, "pull", 0.9}, {{0, 0, 1.06}, "speed", 1.06}, {{0, 0, 1, 0.05}, "late", 0.05}};
+  int held = 0;
   for (const Case& each : cases) {
-    const MissingEffect result = found_in(each.jet, 31);
-    INFO(each.name << " " << each.strength);
-    CHECK(result.verdict == Verdict::Named);
-    REQUIRE(name_of(result) == each.name);
-    const RefinedEffect& effect = result.found.front();
-    CHECK(effect.strength[0] == Approx(each.strength).epsilon(0.2));
-    // four standard deviations are beyond any luck
-    const double base = each.name == "speed" ? 1 : 0;
-    CHECK(std::abs(effect.strength[0] - each.strength) < 4 * effect.deviation[0]);
-    CHECK(effect.deviation[0] < 0.3 * std::abs(each.strength - base));
-    CHECK(effect.share > 0.8);
-    CHECK(result.learn.after < result.learn.before);
-    CHECK(result.confirmation == Confirmation::Confirmed);
-    CHECK(result.held_out.share() > 0.75);
+    const double size = std::abs(each.strength - (each.name == "speed" ? 1 : 0));
+    std::vector<double> off;
+    for (const std::uint32_t seed : {31U, 33U, 35U, 37U, 39U}) {
+      const MissingEffect result = found_in(each.jet, seed);
+      INFO(each.name << " " << each.strength << ", seed " << seed);
+      CHECK(result.verdict == Verdict::Named);
+      REQUIRE(name_of(result) == each.name);
+      const RefinedEffect& effect = result.found.front();
+      off.push_back(std::abs(effect.strength[0] - each.strength));
+      CHECK(off.back() < 4 * effect.deviation[0]);  // beyond any luck
+      CHECK(effect.deviation[0] < 0.3 * size);
+      const auto [low, high] = effect.interval_90(0);
+      held += low <= each.strength && each.strength <= high ? 1 : 0;
+      CHECK(effect.share > 0.8);
+      CHECK(result.learn.after < result.learn.before);
+      CHECK(result.confirmation == Confirmation::Confirmed);
+      CHECK(result.held_out.share() > 0.75);
+    }
+    std::nth_element(off.begin(), off.begin() + 2, off.end());
+    INFO(each.name << " off by " << off[2] << " of " << size);
+    CHECK(off[2] < 0.2 * size);
   }
+  CHECK(held >= 17);  // of 20, as intervals of 90 % that are as wide as they should be do in six of seven such tests
+}
+
+TEST_CASE("missing effect: what is held out may be of a model that knows of less, in another order") {
+  const LocatingJetModel model(0.9, Vector3<double>(0.15, 0.6, 0));
+  const Backwards other(0.6);  // without any tap
+  ThreadExecutor executor{{1}};
+  const Either first(model), second(other);
+  const auto found = [&](const Jet& jet, const Jet& where_checked) {
+    return MissingEffectSearch<Either>({{"a", &first, film_of(jet, 31, 0.9)}},
+                                       {{"b", &second, film_of(where_checked, 32, 0.6)}}, run_jobs_on(executor))
+        .find();
+  };
+  const MissingEffect pulled = found({0, 0.9}, {0, 0.9});
+  REQUIRE(pulled.found.size() == 1);
+  CHECK(first.effects()[pulled.found.front().effect].name == "pull");
+  CHECK(pulled.confirmation == Confirmation::Confirmed);
+  CHECK(pulled.held_out.share() > 0.75);
+  // where there can be no tap, one explains nothing
+  const MissingEffect tapped = found({0, 0, 1, 0, 0, 0, 25, 0.15, 0.6}, {0, 0.9});
+  REQUIRE(tapped.found.size() == 1);
+  CHECK(first.effects()[tapped.found.front().effect].name == "tap");
+  CHECK(tapped.confirmation == Confirmation::Refuted);
+  CHECK(std::abs(tapped.held_out.share()) < 0.1);
+  const Backwards stranger(0.6, "another ");
+  const Either third(stranger);
+  CHECK_THROWS_WITH((MissingEffectSearch<Either>({{"a", &first, film_of({}, 1)}}, {{"b", &third, film_of({}, 2)}},
+                                                 run_jobs_on(executor))),
+                    decant_test::contains("effects of 'b'"));
 }
 
 TEST_CASE("missing effect: what explains no more than chance is no alternative, however near the best one it counts") {
-  const MissingEffect result = found_in({0, 0, 1, 0.03}, 31);  // so weak that nothing is sure
+  MissingEffectSettings settings;
+  settings.sure = 0.999;
+  const MissingEffect result = found_in({0, 0, 1, 0.025}, 31, settings);  // so weak that nothing is sure
   REQUIRE(result.refined.size() == 3);
-  CHECK(result.refined.front().probability < 0.95);
+  CHECK(result.refined.front().probability < settings.sure);
   double sum = 0;
   for (const RefinedEffect& each : result.refined) {
     sum += each.probability;
@@ -403,6 +496,40 @@ TEST_CASE("missing effect: what is left does not depend on how many runs say so"
   CHECK(std::sqrt(said) < 2 * std::sqrt(seen));
 }
 
+TEST_CASE("missing effect: what chaos nearly drowns is run more often") {
+  const Faint model;
+  ThreadExecutor executor{{1}};
+  InteractionRuns<Faint> make(run_jobs_on(executor));
+  RecordingComparison<Faint> compare(make, {}, {});
+  const auto runs_of = [&](const DictionarySettings& settings) {
+    const ComparedRecordings known = compare({{"a", &model, film_of({}, 31, 0.9)}}, model.effects(), settings);
+    std::map<std::pair<std::string, double>, std::vector<std::uint32_t>> seeds;  // by effect and strength
+    for (std::size_t effect = 0; effect < known.effects.size(); ++effect) {
+      for (const std::size_t run : known.dictionary[0].of_effect(effect)) {
+        const PlannedRun& planned = known.dictionary[0].runs[run];
+        seeds[{known.effects[effect].name, planned.run.effects[0].strength[0]}].push_back(planned.run.seed);
+      }
+    }
+    return seeds;
+  };
+  const auto seeds = runs_of({});
+  REQUIRE(seeds.size() == 6);
+  CHECK(seeds.at({"drag", 1.5}).size() == 1);
+  CHECK(seeds.at({"pull", 0.04}).size() == 5);  // chaos moves balls by more than such a pull does
+  CHECK(seeds.at({"pull", -0.04}).size() == 5);
+  CHECK(seeds.at({"pull", 0.35 * 0.04}).size() == 1);
+  std::set<std::uint32_t> different;
+  std::size_t count = 0;
+  for (const auto& [of, each] : seeds) {
+    different.insert(each.begin(), each.end());
+    count += each.size();
+  }
+  CHECK(different.size() == count);
+  DictionarySettings once;
+  once.repeats = 0;
+  CHECK(runs_of(once).at({"pull", 0.04}).size() == 1);
+}
+
 TEST_CASE("missing effect: two at once are found one after another") {
   const MissingEffect result = found_in({0, 0.8, 1, 0.05}, 72);  // the pull alone explains less than enough_share
   CHECK(result.verdict == Verdict::Named);
@@ -417,7 +544,7 @@ TEST_CASE("missing effect: two at once are found one after another") {
   CHECK(std::abs(found[1].strength[0] - 0.8) < 4 * found[1].deviation[0]);
   CHECK(std::abs(found[3].strength[0] - 0.05) < 4 * found[3].deviation[0]);
   CHECK(found[1].deviation[0] < 0.2);
-  CHECK(found[3].deviation[0] < 0.01);
+  CHECK(found[3].deviation[0] < 0.3 * 0.05);
   CHECK(result.confirmation == Confirmation::Confirmed);
 }
 

@@ -3,6 +3,7 @@
 
 #include "../../examples/support/scene_interaction.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -30,11 +31,11 @@ std::string scene_text(double column_m, const std::string& more = "") {
 constexpr const char* read_of_it =
     "t_s,front_mm,level_mm@0.032,0.024\n-0.1,64,96\n0.05,70,95\n0.1,100,90\n0.15,140,\n0.5,1,1\n";
 
-example::RecordedInteraction interaction(const std::string& name, const std::string& scene) {
+example::RecordedInteraction interaction(const std::string& name, const std::string& scene,
+                                         example::InteractionOptions options = {}) {
   const decant_test::TemporaryFolder folder("scene_interaction_" + name);
   folder.write("scene.json", scene);
   folder.write("measurements.csv", read_of_it);
-  example::InteractionOptions options;
   options.model.spacing = 0.016;
   options.frames_per_second = 20;
   return example::interaction_of(example::read_interaction_source(folder.path()), options);
@@ -120,6 +121,33 @@ TEST_CASE("measured scene: a container that is filled is poured from where there
   const double level = std::acos(-1) * 0.03 * 0.03 * 0.05;  // [m^3]
   CHECK(volume(1) == Approx(level).epsilon(0.03));
   CHECK(volume(1.25) == Approx(1.25 * level).epsilon(0.03));
+}
+
+TEST_CASE("measured scene: effects of another container are known by the words of the first recording") {
+  const auto scene = [](const std::string& container, const std::string& below) {
+    return R"({"format": "decant-scene", "version": 1, "name": "pour", "spacing_m": 0.008, "end_s": 0.3, "bodies": [
+        {"name": ")" +
+           below + R"(", "shape": {"cylinder_inside": {"radius_m": 0.1, "height_m": 0.05}, "open": "+z"}},
+        {"name": ")" +
+           container + R"(", "shape": {"cylinder_inside": {"radius_m": 0.03, "height_m": 0.08}, "open": "+z"},
+         "pose": {"position_m": [0.0, 0.0, 0.2], "quaternion_wxyz": [1, 0, 0, 0]}}],
+        "fluid": [{"fill": {"body": ")" +
+           container + R"(", "level_m": 0.05}}]})";
+  };
+  const auto words = [](const example::RecordedInteraction& of) {
+    std::vector<std::string> result;
+    for (const Effect& effect : of.model.effects()) {
+      result.push_back(effect.words());
+    }
+    return result;
+  };
+  const example::RecordedInteraction first = interaction("first", scene("cup", "pan"));
+  const std::vector<std::string> known = words(first);
+  CHECK(std::count(known.begin(), known.end(), "obstacle, mouth of the cup") == 1);
+  example::InteractionOptions as_first;
+  as_first.names = example::names_by_role(first.recording);
+  CHECK(words(interaction("other", scene("beaker", "bowl"), as_first)) == known);
+  CHECK(words(interaction("alone", scene("beaker", "bowl"))) != known);
 }
 
 TEST_CASE("measured scene: what cannot be one is refused") {

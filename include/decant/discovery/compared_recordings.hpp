@@ -103,6 +103,41 @@ std::vector<DistanceLeft> distances_left(InteractionRuns<Model>& make,
   return result;
 }
 
+/// More of the strongest runs of faint effects, with other seeds: as many as make their mean's chaos an eighth of what
+/// the effect does, if settings allow for so many. A curve through single runs of a faint effect is mostly chaos, and
+/// what is told apart least are faint effects (gravity and a pull, thick liquid and shear-thinning). How many there are
+/// depends on the model alone, as far as features do.
+inline std::vector<PlannedRun> repeats_of_faint(const ComparedRecordings& known, const DictionarySettings& settings) {
+  constexpr double enough = 8;
+  std::vector<PlannedRun> repeats;
+  std::uint32_t seed = 3001;
+  const EffectDictionary& first = known.dictionary.front();
+  for (std::size_t run = 0; run < first.runs.size(); ++run) {
+    const PlannedRun& planned = first.runs[run];
+    if (planned.role != RunRole::Effect || !is_strongest(first.effects[planned.effect], first.strength(run), settings)) {
+      continue;
+    }
+    int count = 0;
+    for (std::size_t k = 0; k < known.recorded.size(); ++k) {
+      const RecordedEvidence& recorded = known.recorded[k];
+      const auto features = recorded.mean_features({&known.dictionary[k].seen[run], 1});
+      if (features && recorded.chaos() > 0) {
+        const NuisanceSpace& space = recorded.space();
+        const double energy = space.distance(space.standardised(*features)) - recorded.chaos();
+        const double runs = energy > 0 ? std::ceil(enough * recorded.chaos() / energy) : settings.repeats + 1.0;
+        count = std::max(count, static_cast<int>(std::min(runs - 1, static_cast<double>(settings.repeats))));
+      }
+    }
+    for (int repeat = 0; repeat < settings.repeats; ++repeat, ++seed) {
+      if (repeat < count) {
+        repeats.push_back(planned);
+        repeats.back().run.seed = seed;
+      }
+    }
+  }
+  return repeats;
+}
+
 /// Runs dictionaries and compares recordings with them.
 template <ForwardModel Model>
 class RecordingComparison {
@@ -146,6 +181,10 @@ class RecordingComparison {
       known.dictionary.push_back({effects, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
     }
     compare(of, known);
+    const std::vector<PlannedRun> repeats = repeats_of_faint(known, settings);
+    if (!repeats.empty()) {
+      extend(of, repeats, known);
+    }
     return known;
   }
 
@@ -181,21 +220,7 @@ class RecordingComparison {
           plan.push_back(std::move(planned));
         }
       }
-      std::vector<Run> runs;
-      for (const Interaction<Model>& each : of) {
-        for (const PlannedRun& planned : plan) {
-          runs.emplace_back(&each, planned.run);
-        }
-      }
-      const std::vector<Observation> seen = (*runs_)(runs);
-      for (std::size_t k = 0; k < of.size(); ++k) {
-        EffectDictionary& dictionary = known.dictionary[k];
-        dictionary.effects = known.effects;
-        dictionary.runs.insert(dictionary.runs.end(), plan.begin(), plan.end());
-        const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
-        dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
-      }
-      compare(of, known);
+      extend(of, plan, known);
       return true;
     }
     return false;
@@ -203,6 +228,26 @@ class RecordingComparison {
 
  private:
   using Run = typename InteractionRuns<Model>::Run;
+
+  /// Makes more runs of each interaction, and compares its recording with all that there are then.
+  void extend(const std::vector<Interaction<Model>>& of, const std::vector<PlannedRun>& plan,
+              ComparedRecordings& known) {
+    std::vector<Run> runs;
+    for (const Interaction<Model>& each : of) {
+      for (const PlannedRun& planned : plan) {
+        runs.emplace_back(&each, planned.run);
+      }
+    }
+    const std::vector<Observation> seen = (*runs_)(runs);
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      EffectDictionary& dictionary = known.dictionary[k];
+      dictionary.effects = known.effects;
+      dictionary.runs.insert(dictionary.runs.end(), plan.begin(), plan.end());
+      const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
+      dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
+    }
+    compare(of, known);
+  }
 
   /// Recordings with dictionaries.
   void compare(const std::vector<Interaction<Model>>& of, ComparedRecordings& known) {

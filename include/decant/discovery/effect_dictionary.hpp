@@ -3,8 +3,10 @@
 
 /// Runs of a forward model that tell what each effect would change, and what differs anyway.
 
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -40,6 +42,7 @@ struct DictionarySettings {
   int baselines = 4;                      ///< >= 1
   int draws = 48;                         ///< >= 5: with few of them much passes for chance that is not
   std::vector<double> shares{0.35, 1.0};  ///< of the range to each side of an effect's base, in (0, 1]; at least one
+  int repeats = 4;                        ///< at most, of the strongest run to each side, >= 0; see repeats_of_faint
 };
 
 /// The runs for all effects that are looked for. Seeds follow from the run's number in its role, so that runs of one
@@ -53,6 +56,7 @@ inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effect
   expects(settings.baselines >= 1, "DictionarySettings: baselines", ">= 1", settings.baselines);
   expects(settings.draws >= 5, "DictionarySettings: draws", ">= 5", settings.draws);
   expects(!settings.shares.empty(), "DictionarySettings: shares", "at least one", "none");
+  expects(settings.repeats >= 0, "DictionarySettings: repeats", ">= 0", settings.repeats);
   for (const double share : settings.shares) {
     expects(share > 0 && share <= 1, "DictionarySettings: share", "in (0, 1]", share);
   }
@@ -97,6 +101,20 @@ inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effect
     }
   }
   return runs;
+}
+
+/// Whether an effect is as strong as it is in any run to that side.
+inline bool is_strongest(const Effect& effect, const Eigen::VectorXd& strength, const DictionarySettings& settings) {
+  const double largest = *std::max_element(settings.shares.begin(), settings.shares.end());
+  for (std::size_t k = 0; k < effect.components.size(); ++k) {
+    const EffectComponent& of = effect.components[k];
+    const double more = strength[static_cast<Eigen::Index>(k)] - of.base;
+    const double end = (more < 0 ? of.low : of.high) - of.base;
+    if (more != 0 && std::abs(more) >= (largest - 1e-9) * std::abs(end)) {
+      return true;
+    }
+  }
+  return false;
 }
 
 /// What a run depends on beside its model, as text: for journals.

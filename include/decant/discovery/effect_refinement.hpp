@@ -13,6 +13,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
@@ -28,12 +29,17 @@ namespace decant::inline DECANT_TARGET {
 class EffectPoint {
  public:
   /// Takes one more effect. @param effect has to outlive the point. @param number of it among the model's effects.
-  /// @param guess to begin with. Throws std::invalid_argument for another number of components.
-  void add(const Effect& effect, std::size_t number, const AppliedEffect& guess) {
+  /// @param guess to begin with. @param least_step by component, >= 0: strengths less far off would not tell; 0 for all
+  /// if it is empty. Throws std::invalid_argument for another number of components.
+  void add(const Effect& effect, std::size_t number, const AppliedEffect& guess,
+           const Eigen::VectorXd& least_step = {}) {
     const auto components = static_cast<Eigen::Index>(effect.components.size());
     expects(guess.strength.size() == components, "EffectPoint: strength", "a number for each component",
             guess.strength.size());
+    expects(least_step.size() == 0 || least_step.size() == components, "EffectPoint: least steps",
+            "a number for each component", least_step.size());
     Part part{&effect, number, value_.size(), components};
+    part.least_step = least_step.size() > 0 ? least_step : Eigen::VectorXd::Zero(components);
     const Vector3<double> place = guess.place.value_or(effect.place.value_or(Vector3<double>::Zero()));
     const TimeWindow window = guess.window.value_or(effect.window.value_or(TimeWindow{}));
     part.coordinates = effect.place && effect.place_tolerance > 0 ? 3 : 0;
@@ -85,7 +91,8 @@ class EffectPoint {
       return 0.4 * of.effect->place_tolerance;
     }
     const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
-    return std::max(0.3 * std::abs(value_[k] - component.base), 0.05 * (component.high - component.low));
+    return std::max({0.3 * std::abs(value_[k] - component.base), 0.05 * (component.high - component.low),
+                     of.least_step[k - of.begin]});
   }
   /// The range of a number: strengths may be half as large again as those that are looked through at first.
   std::pair<double, double> range(Eigen::Index k) const {
@@ -136,6 +143,7 @@ class EffectPoint {
     const Effect* effect;
     std::size_t number;
     Eigen::Index begin, components, coordinates = 0, begins = 0, ends = 0;  ///< how many numbers it has of each
+    Eigen::VectorXd least_step{};
 
     Eigen::Index size() const noexcept { return components + coordinates + begins + ends; }
     Eigen::Index place() const noexcept { return begin + components; }
@@ -160,18 +168,22 @@ struct RefinementView {
   Eigen::VectorXd middle{};          ///< at the point
   Eigen::MatrixXd slope{};           ///< p x size of the point: what a change of one unit does
   Eigen::MatrixXd below{}, above{};  ///< p x size of the point: one step off in each of its numbers
+  Eigen::VectorXd chaos{};           ///< by number: how large a slope is by chaos alone, as a distance; none if empty
 };
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
 /// No number moves more than two of its steps, nor out of its range.
+/// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos makes steps
+/// shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates scatter would seem
+/// to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).
 inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<RefinementView>& views,
-                                  const std::vector<Eigen::VectorXd>& features) {
+                                  const std::vector<Eigen::VectorXd>& features, bool without_chaos = false) {
   expects(!views.empty() && features.size() == views.size(), "refinement: features", "those of each recording",
           features.size());
   const Eigen::Index size = at.size();
   Eigen::MatrixXd curvature = Eigen::MatrixXd::Zero(size, size);
-  Eigen::VectorXd answer = Eigen::VectorXd::Zero(size), unit(size);
+  Eigen::VectorXd answer = Eigen::VectorXd::Zero(size), chaos = Eigen::VectorXd::Zero(size), unit(size);
   for (Eigen::Index k = 0; k < size; ++k) {
     unit[k] = at.step(k);
   }
@@ -187,11 +199,20 @@ inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<Refin
       for (Eigen::Index j = 0; j < size; ++j) {
         curvature(i, j) += view.space->inner(slope[static_cast<std::size_t>(i)], slope[static_cast<std::size_t>(j)]);
       }
+      chaos[i] += view.chaos.size() > 0 ? unit[i] * unit[i] * view.chaos[i] : 0;
     }
   }
   // what changes nothing stays where it is
   curvature.diagonal().array() += 1e-2 * curvature.diagonal().maxCoeff() + 1e-12;
-  Eigen::VectorXd move = curvature.ldlt().solve(answer);
+  Eigen::VectorXd move;
+  if (without_chaos) {
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> chaotic(Eigen::MatrixXd(chaos.asDiagonal()),
+                                                                            curvature);
+    const Eigen::VectorXd left = 1 - chaotic.eigenvalues().array().min(2.0 / 3);
+    move = chaotic.eigenvectors() * (chaotic.eigenvectors().transpose() * answer).cwiseQuotient(left);
+  } else {
+    move = curvature.ldlt().solve(answer);
+  }
   for (Eigen::Index k = 0; k < size; ++k) {
     const auto [low, high] = at.range(k);
     move[k] = std::clamp(at.value()[k] + unit[k] * std::clamp(move[k], -2.0, 2.0), low, high) - at.value()[k];

@@ -69,7 +69,8 @@ class EffectRefiner {
     for (const Candidate& each : candidates) {
       points.push_back(each.point);
     }
-    const std::vector<DistanceLeft> left = distances(points, known);
+    const bool faint = before <= known.chance.largest_distance;  // few runs would tell more of chaos than of it
+    const std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
     std::vector<Evidence> evidence;
     double least = std::numeric_limits<double>::infinity();
     std::size_t best = 0;
@@ -88,8 +89,10 @@ class EffectRefiner {
       one.distance = left[k].value;
       one.evidence = evidence[k];
       one.share = share_of_reducible(before, one.distance, known.chance.distance, least);
+      // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)
+      const double more = std::sqrt(std::max(1.0, one.distance / std::max(known.chance.distance, 1e-12)));
       const Eigen::VectorXd deviation =
-          k == best ? deviations(points[k], candidates[k].views, known)
+          k == best ? Eigen::VectorXd(more * deviations(points[k], candidates[k].views, known))
                     : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);
@@ -130,20 +133,60 @@ class EffectRefiner {
     double distance = std::numeric_limits<double>::infinity();
   };
 
-  /// The run of the dictionary with an effect that is nearest to what was recorded; infinitely far where none worked.
+  /// The runs of the dictionary with an effect at one strength that are nearest to what was recorded; infinitely far
+  /// where none worked.
   static NearestRun nearest_run(std::size_t effect, const ComparedRecordings& known) {
+    const EffectDictionary& first = known.dictionary.front();
     NearestRun nearest;
-    for (const std::size_t run : known.dictionary.front().of_effect(effect)) {
+    std::vector<std::size_t> left = first.of_effect(effect);
+    while (!left.empty()) {
+      const Eigen::VectorXd strength = first.strength(left.front());
+      const auto others = std::stable_partition(left.begin(), left.end(),
+                                                [&](std::size_t run) { return first.strength(run) == strength; });
       std::vector<Observation> seen;
       for (const EffectDictionary& each : known.dictionary) {
-        seen.push_back(each.seen[run]);
+        std::for_each(left.begin(), others, [&](std::size_t run) { seen.push_back(each.seen[run]); });
       }
+      left.erase(left.begin(), others);
       const double distance = distance_left(known.recorded, seen).value;
       if (distance < nearest.distance) {
-        nearest = {known.dictionary.front().strength(run), distance};
+        nearest = {strength, distance};
       }
     }
     return nearest;
+  }
+
+  /// By component, half of how far strengths have to be apart to differ by four times as much as two runs' mean does by
+  /// chaos; of what is too faint for that, half of all strengths.
+  static Eigen::VectorXd telling_steps(const EffectStanding& standing, const ComparedRecordings& known) {
+    constexpr double enough = 4;
+    const Effect& effect = known.effects[standing.effect];
+    std::vector<EffectCurve> curves;
+    double chaos = 0;
+    for (const RecordedEvidence& each : known.recorded) {
+      curves.push_back(*each.curve(standing.effect));
+      chaos += each.chaos();
+    }
+    Eigen::VectorXd steps(standing.strength.size());
+    for (Eigen::Index k = 0; k < steps.size(); ++k) {
+      const EffectComponent& of = effect.components[static_cast<std::size_t>(k)];
+      const double end = standing.strength[k] < of.base || of.high == of.base ? of.low : of.high;
+      const auto tells = [&](double share) {
+        Eigen::VectorXd strength = effect.base();
+        strength[k] = of.base + share * (end - of.base);
+        double energy = 0;
+        for (std::size_t which = 0; which < curves.size(); ++which) {
+          energy += curves[which].energy(strength, known.recorded[which].chaos());
+        }
+        return energy >= enough * chaos;
+      };
+      double share = 1;
+      for (double less = 0.95; less > 0 && tells(less); less -= 0.05) {
+        share = less;
+      }
+      steps[k] = 0.5 * share * std::abs(end - of.base);
+    }
+    return steps;
   }
 
   /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places two of
@@ -170,7 +213,7 @@ class EffectRefiner {
       for (const RefinedEffect& each : found) {
         candidate.point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
       }
-      candidate.point.add(effect, number, {number, standing.strength, {}});
+      candidate.point.add(effect, number, {number, standing.strength, {}}, telling_steps(standing, known));
       candidate.point = candidate.point.rounded();
       const double evidence =
           evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(candidate.point.size());
@@ -314,6 +357,10 @@ class EffectRefiner {
         mean_distance([](const View& view, const Features& own) -> Features { return own - view.middle; });
     candidate.expected = mean_distance(
         [&](const View& view, const Features& own) -> Features { return own - view.middle - view.slope * move; });
+    for (const View& view : candidate.views) {  // what slopes have of chaos
+      candidate.expected -= view.chaos.dot(move.cwiseAbs2()) / static_cast<double>(candidate.views.size());
+    }
+    candidate.expected = std::max(candidate.expected, 0.0);
     EffectPoint next = candidate.point;
     for (Eigen::Index k = 0; k < next.size(); ++k) {
       next = next.with(k, candidate.point.value()[k] + move[k]);
@@ -352,6 +399,7 @@ class EffectRefiner {
       return std::nullopt;
     }
     RefinementView view{&recorded.space(), *middle};
+    view.chaos.resize(point.size());
     for (Eigen::MatrixXd* each : {&view.slope, &view.below, &view.above}) {
       each->resize(middle->size(), point.size());
     }
@@ -366,6 +414,7 @@ class EffectRefiner {
         return std::nullopt;
       }
       view.slope.col(k) = (*above - *below) / apart;
+      view.chaos[k] = 2 * recorded.chaos() / static_cast<double>(seeds) / (apart * apart);
       view.below.col(k) = *below;
       view.above.col(k) = *above;
     }
@@ -394,7 +443,7 @@ class EffectRefiner {
         }
       }
       if (features.size() == of_->size()) {
-        moves.push_back(refinement(point, views, features));
+        moves.push_back(refinement(point, views, features, true));
       }
     }
     if (moves.size() < 3) {
@@ -411,9 +460,10 @@ class EffectRefiner {
   }
 
   /// What is left of the learnt recordings at each point; infinite where runs fail. All points have the same seeds:
-  /// what chaos does to all alike tells nothing of them.
-  std::vector<DistanceLeft> distances(const std::vector<EffectPoint>& points, const ComparedRecordings& known) {
-    const auto seeds = static_cast<std::size_t>(settings_.dictionary.baselines);
+  /// what chaos does to all alike tells nothing of them. @param times as many runs as there are baselines.
+  std::vector<DistanceLeft> distances(const std::vector<EffectPoint>& points, const ComparedRecordings& known,
+                                      int times) {
+    const auto seeds = static_cast<std::size_t>(times * settings_.dictionary.baselines);
     std::vector<Run> runs;
     for (const EffectPoint& point : points) {
       std::uint32_t seed = 9001;

@@ -8,6 +8,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <random>
 #include <string>
@@ -75,6 +76,44 @@ inline std::vector<AppliedEffect> effects_of_run(const std::vector<Effect>& effe
   }
   return as;
 }
+
+/// Which effects of a model are those that something else numbers, by their words. What a model does not know of does
+/// nothing in it, as air that is held up does where there is no neck.
+class EffectNumbers {
+ public:
+  /// They are the model's own.
+  EffectNumbers() noexcept {}  // not defaulted: GCC 12 fails on that in an aggregate of a template
+  EffectNumbers(const std::vector<Effect>& effects, const std::vector<Effect>& of_model)
+      : same_(std::equal(effects.begin(), effects.end(), of_model.begin(), of_model.end(),
+                         [](const Effect& a, const Effect& b) { return a.words() == b.words(); })) {
+    for (std::size_t k = 0; k < effects.size() && !same_; ++k) {
+      const auto known = std::find_if(of_model.begin(), of_model.end(),
+                                      [&](const Effect& each) { return each.words() == effects[k].words(); });
+      if (known != of_model.end()) {
+        in_model_[k] = static_cast<std::size_t>(known - of_model.begin());
+      }
+    }
+  }
+
+  /// Whether they are the model's own, in its order.
+  bool same() const noexcept { return same_; }
+  /// Whether the model knows of none of them.
+  bool none() const noexcept { return !same_ && in_model_.empty(); }
+
+  ModelRun in_model(ModelRun run) const {
+    if (!same_) {
+      std::erase_if(run.effects, [this](const AppliedEffect& each) { return !in_model_.contains(each.effect); });
+      for (AppliedEffect& each : run.effects) {
+        each.effect = in_model_.at(each.effect);
+      }
+    }
+    return run;
+  }
+
+ private:
+  bool same_ = true;
+  std::map<std::size_t, std::size_t> in_model_{};
+};
 
 /// Something that a camera saw.
 struct Sighting {

@@ -28,6 +28,7 @@ struct Interaction {
   Observation recording{};
   std::string
       of_model{};  ///< all that the model's predictions depend on, for RunJobs' keys; the name where it is empty
+  EffectNumbers numbers{};  ///< of a search's effects in the model
 };
 
 /// Runs jobs: work(k) for each key, results in the order of the keys. A key says all that a result depends on beside
@@ -60,7 +61,7 @@ class InteractionRuns {
     for (std::size_t k = 0; k < runs.size(); ++k) {
       const Interaction<Model>& of = *runs[k].first;
       std::string key = of.of_model.empty() ? of.name : of.of_model;
-      key += ": " + run_key(of.model->effects(), runs[k].second);
+      key += ": " + run_key(of.model->effects(), of.numbers.in_model(runs[k].second));
       const auto [place, is_new] = number.try_emplace(key, keys.size());
       if (is_new) {
         keys.push_back(std::move(key));
@@ -70,7 +71,7 @@ class InteractionRuns {
     }
     const std::vector<JobResult> results = run_jobs_(keys, [&](std::size_t job) {
       const auto& [interaction, run] = runs[first[job]];
-      return Observation(interaction->model->predict(run)).numbers();
+      return Observation(interaction->model->predict(interaction->numbers.in_model(run))).numbers();
     });
     made_ += keys.size();
     std::vector<Observation> seen;

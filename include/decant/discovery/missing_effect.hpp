@@ -41,12 +41,14 @@ template <ForwardModel Model>
 class MissingEffectSearch {
  public:
   /// @param learn recordings of which all have what is missing, at one strength. @param held_out others, to check on.
+  /// Their models may know of fewer effects, or have them in another order; which one is which is told by its words.
   /// @param references recordings, of any poses, containers and amounts, in which nothing is missing: how far reality
   /// is from the model all the same. What those of nearly the same interaction are off by is taken off what was
   /// recorded; of others it is known how much that is, and how much of it effects seem to explain. Without any, the
   /// model's own scatter and JudgementSettings::distance_factor stand for it.
-  /// Throws std::invalid_argument if there is nothing to learn from, models of what is learnt from or held out have
-  /// other effects than the first one's, names are not all different, or a setting is out of range.
+  /// Throws std::invalid_argument if there is nothing to learn from, models of what is learnt from have other effects
+  /// than the first one's, or one of those held out none of them, names are not all different, or a setting is out of
+  /// range.
   MissingEffectSearch(std::vector<Interaction<Model>> learn, std::vector<Interaction<Model>> held_out, RunJobs run_jobs,
                       MissingEffectSettings settings = {}, std::vector<Interaction<Model>> references = {})
       : learn_(std::move(learn)),
@@ -60,13 +62,15 @@ class MissingEffectSearch {
       for (const Interaction<Model>& each : *set) {
         expects(each.model != nullptr, "MissingEffectSearch: model of '" + each.name + "'", "one", "none");
         expects(names.insert(each.name).second, "MissingEffectSearch: names", "all different", each.name);
-        const std::vector<Effect>& own = each.model->effects();
-        const bool same = set == &references_ ||  // of which none is asked for by its number
-                          std::equal(own.begin(), own.end(), effects().begin(), effects().end(),
-                                     [](const Effect& a, const Effect& b) { return a.words() == b.words(); });
-        expects(same, "MissingEffectSearch: effects of '" + each.name + "'", "those of the first recording's model",
-                own.size());
+        const EffectNumbers numbers(effects(), each.model->effects());
+        const bool fits = set == &references_ ||  // of which none is asked for by its number
+                          (set == &learn_ ? numbers.same() : !numbers.none());
+        expects(fits, "MissingEffectSearch: effects of '" + each.name + "'", "those of the first recording's model",
+                each.model->effects().size());
       }
+    }
+    for (Interaction<Model>& each : held_out_) {
+      each.numbers = EffectNumbers(effects(), each.model->effects());
     }
     expects(settings_.refined >= 1 && settings_.refinement_rounds >= 1 && settings_.refinement_seeds >= 1,
             "MissingEffectSettings: refined, refinement_rounds, refinement_seeds", ">= 1", settings_.refined);

@@ -13,7 +13,7 @@ namespace decant::inline DECANT_TARGET {
 /// Settings of MissingEffectSearch.
 struct MissingEffectSettings {
   DictionarySettings dictionary{};
-  DictionarySettings next_dictionary{4, 16, {0.5}};  ///< after an effect was added, and something is still missing
+  DictionarySettings next_dictionary{4, 16, {0.5}, 0};  ///< after an effect was added, and something is still missing
   RecordedEvidenceSettings evidence{};
   JudgementSettings judgement{};
   int refined = 3;                     ///< so many of the best are looked at more closely, >= 1
