@@ -114,7 +114,8 @@ inline std::vector<PlannedRun> repeats_of_faint(const ComparedRecordings& known,
   const EffectDictionary& first = known.dictionary.front();
   for (std::size_t run = 0; run < first.runs.size(); ++run) {
     const PlannedRun& planned = first.runs[run];
-    if (planned.role != RunRole::Effect || !is_strongest(first.effects[planned.effect], first.strength(run), settings)) {
+    if (planned.role != RunRole::Effect ||
+        !is_strongest(first.effects[planned.effect], first.strength(run), settings)) {
       continue;
     }
     int count = 0;

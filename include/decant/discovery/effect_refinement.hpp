@@ -174,9 +174,9 @@ struct RefinementView {
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
 /// No number moves more than two of its steps, nor out of its range.
-/// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos makes steps
-/// shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates scatter would seem
-/// to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).
+/// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos
+/// makes steps shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates
+/// scatter would seem to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).
 inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<RefinementView>& views,
                                   const std::vector<Eigen::VectorXd>& features, bool without_chaos = false) {
   expects(!views.empty() && features.size() == views.size(), "refinement: features", "those of each recording",
