@@ -2,6 +2,7 @@
 #include <decant/discovery/effect_refinement.hpp>
 
 #include <algorithm>
+#include <cstdint>
 #include <initializer_list>
 #include <limits>
 #include <random>
@@ -27,6 +28,27 @@ Eigen::VectorXd numbers(std::initializer_list<double> values) {
   Eigen::VectorXd result(static_cast<Eigen::Index>(values.size()));
   std::copy(values.begin(), values.end(), result.begin());
   return result;
+}
+
+/// Matrices of normally distributed numbers.
+class NormalMatrices {
+ public:
+  explicit NormalMatrices(std::uint32_t seed) : random_(seed) {}
+  Eigen::MatrixXd operator()(Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal_(random_); });
+  }
+
+ private:
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_{0, 1};
+};
+
+/// In which 400 features vary on their own.
+NuisanceSpace independent_features(NormalMatrices& draw) {
+  NuisanceSample sample;
+  sample.baseline = draw(400, 4);
+  sample.draws = draw(400, 40);
+  return NuisanceSpace(sample);
 }
 
 }  // namespace
@@ -110,11 +132,7 @@ TEST_CASE("refinement: one step finds what is linear, in several recordings toge
   EffectPoint point;
   point.add(drag, 0, {0, numbers({1})});
   point.add(pull, 1, {1, numbers({0.2})});
-  std::mt19937 random(3);
-  std::normal_distribution<double> normal(0, 1);
-  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
-    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
-  };
+  NormalMatrices draw(3);
   std::vector<NuisanceSpace> spaces;
   std::vector<RefinementView> views;
   std::vector<Eigen::VectorXd> features;
@@ -143,15 +161,8 @@ TEST_CASE("refinement: chaos in slopes makes steps shorter, unless it is taken o
   const Effect drag = named("drag", {{"", 0, 0, 4}});
   EffectPoint point;
   point.add(drag, 0, {0, numbers({1})}, numbers({0.5}));
-  std::mt19937 random(11);
-  std::normal_distribution<double> normal(0, 1);
-  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
-    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
-  };
-  NuisanceSample sample;
-  sample.baseline = draw(400, 4);
-  sample.draws = draw(400, 40);
-  const NuisanceSpace space(sample);
+  NormalMatrices draw(11);
+  const NuisanceSpace space = independent_features(draw);
   // a slope that is half effect and half chaos, of each of which the size is known
   const Eigen::VectorXd slope = draw(400, 1);
   const double chaos = space.distance(space.standardised_difference(draw(400, 1)));
@@ -174,15 +185,8 @@ TEST_CASE("refinement: of two effects that do nearly the same, their sum is told
   EffectPoint point;
   point.add(drag, 0, {0, numbers({1})}, numbers({0.5}));
   point.add(other, 1, {1, numbers({1})}, numbers({0.5}));
-  std::mt19937 random(12);
-  std::normal_distribution<double> normal(0, 1);
-  const auto draw = [&](Eigen::Index rows, Eigen::Index columns) {
-    return Eigen::MatrixXd(Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
-  };
-  NuisanceSample sample;
-  sample.baseline = draw(400, 4);
-  sample.draws = draw(400, 40);
-  const NuisanceSpace space(sample);
+  NormalMatrices draw(12);
+  const NuisanceSpace space = independent_features(draw);
   Eigen::MatrixXd slope = draw(400, 2);
   slope.col(1) = slope.col(0) + 0.1 * slope.col(1);
   const double chaos = space.distance(space.standardised_difference(draw(400, 1)));

@@ -25,6 +25,7 @@
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/interaction_runs.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
+#include <decant/discovery/nuisance_space.hpp>
 #include <decant/discovery/observation.hpp>
 
 namespace decant::inline DECANT_TARGET {

@@ -20,6 +20,7 @@
 #include <decant/core/target.hpp>
 #include <decant/discovery/compared_recordings.hpp>
 #include <decant/discovery/effect.hpp>
+#include <decant/discovery/effect_curve.hpp>
 #include <decant/discovery/effect_evidence.hpp>
 #include <decant/discovery/effect_judgement.hpp>
 #include <decant/discovery/effect_refinement.hpp>
