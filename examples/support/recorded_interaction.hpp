@@ -61,6 +61,7 @@ struct InteractionOptions {
   bool planned = false;
 };
 
+/// What a recording calls its bodies, for InteractionOptions::names of those that are compared with it.
 inline std::map<std::optional<decant::recording::Role>, std::vector<std::string>> names_by_role(
     const decant::Recording& recording) {
   std::map<std::optional<decant::recording::Role>, std::vector<std::string>> names;
