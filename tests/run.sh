@@ -11,8 +11,8 @@ set -uo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 jobs=${DECANT_TEST_JOBS:-$(nproc)}
-# a compiler takes up to 3 GB
-compilers=$(awk '/^MemAvailable/ { print int($2 / 1024 / 3000) }' /proc/meminfo 2>/dev/null || echo "$jobs")
+# a compiler takes up to 5 GB
+compilers=$(awk '/^MemAvailable/ { print int($2 / 1024 / 5000) }' /proc/meminfo 2>/dev/null || echo "$jobs")
 compilers=$((compilers < 1 ? 1 : compilers > jobs ? jobs : compilers))
 build=${DECANT_BUILD_DIR:-build}
 for_ci=OFF

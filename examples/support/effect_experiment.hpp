@@ -283,8 +283,8 @@ class EffectExperiment {
       nlohmann::json& told = json[key] = missing_effect_json(after.judged, after, kept[0]->recording.gravity);
       told["interaction"] = interaction_letter(2 + which);
       told["truth"] = folder_.truth(recording_name(of, 0));
-      const auto asked =
-          std::find_if(advice.begin(), advice.end(), [&](const auto& each) { return each.which == which; });
+      const auto asked = std::find_if(advice.begin(), advice.end(),
+                                      [&, asked_of = which](const auto& each) { return each.which == asked_of; });
       told["gain_bit"] = number_json(asked->gain);
       told["settles"] = number_json(asked->settles);
     }

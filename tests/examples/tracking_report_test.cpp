@@ -46,19 +46,20 @@ TEST_CASE("tracking report: pictures are cut to the liquid of all frames and met
   };
   results[0].result.overlays = {Overlay(), labelled(3, 40)};
   results[1].result.overlays = {labelled(30, 88)};
-  const detail::Region region = detail::region_of_liquid(detail::film_sources(results), 100, 100);
+  const example::detail::Region region =
+      example::detail::region_of_liquid(example::detail::film_sources(results), 100, 100);
   CHECK(region.top == 0);
   CHECK(region.left == 40 - 13);  // 8 and a twelfth of 60
   CHECK(region.top + region.height == 42 + 13);
   CHECK(region.left + region.width == 100);
-  const auto picture =
-      detail::overlay_picture(decant::Image<std::uint8_t>::Constant(region.height, region.width, detail::body),
-                              results[1].result.overlays[0], region);
-  CHECK((picture.index == detail::both).count() == 144);
-  CHECK(picture.index(30, 88 - 27) == detail::both);
-  CHECK(picture.index(29, 88 - 27) == detail::body);
+  const auto picture = example::detail::overlay_picture(
+      decant::Image<std::uint8_t>::Constant(region.height, region.width, example::detail::body),
+      results[1].result.overlays[0], region);
+  CHECK((picture.index == example::detail::both).count() == 144);
+  CHECK(picture.index(30, 88 - 27) == example::detail::both);
+  CHECK(picture.index(29, 88 - 27) == example::detail::body);
 
-  const detail::Region all = detail::region_of_liquid({}, 100, 80);
+  const example::detail::Region all = example::detail::region_of_liquid({}, 100, 80);
   CHECK(all.height == 100);
   CHECK(all.width == 80);
 }
@@ -68,28 +69,28 @@ TEST_CASE("tracking report: the frames that are shown have liquid and are spread
   for (std::size_t frame = 30; frame < 90; ++frame) {
     overlays[frame].label.setConstant(20, 20, frame == 50 ? Overlay::predicted : 3);
   }
-  CHECK(detail::telling_frames(overlays, 3) == std::vector<std::size_t>{30, 60, 89});
-  CHECK(detail::telling_frames(overlays, 6).size() == 6);
-  CHECK(detail::telling_frames(std::vector<Overlay>(2), 6) == std::vector<std::size_t>{0, 1});
-  CHECK(detail::telling_frames({}, 6).empty());
+  CHECK(example::detail::telling_frames(overlays, 3) == std::vector<std::size_t>{30, 60, 89});
+  CHECK(example::detail::telling_frames(overlays, 6).size() == 6);
+  CHECK(example::detail::telling_frames(std::vector<Overlay>(2), 6) == std::vector<std::size_t>{0, 1});
+  CHECK(example::detail::telling_frames({}, 6).empty());
 }
 
 TEST_CASE("tracking report: bodies have an edge where something far lies beside them") {
   decant::Image<float> depth = decant::Image<float>::Constant(6, 6, std::numeric_limits<float>::infinity());
   depth.block(1, 1, 4, 4).setConstant(1.0F);
   depth.block(1, 3, 4, 2).setConstant(1.5F);
-  const auto picture = detail::bodies_from_depth(depth, {0, 0, 6, 6});
-  CHECK(picture(0, 0) == detail::background);
-  CHECK(picture(1, 1) == detail::body_edge);
-  CHECK(picture(2, 2) == detail::body_edge);  // nearer than what is right of it
-  CHECK(picture(2, 3) == detail::body);       // farther than what is left of it
-  CHECK((detail::bodies_from_depth(depth, {2, 2, 2, 3}) == picture.block(2, 2, 2, 3)).all());
+  const auto picture = example::detail::bodies_from_depth(depth, {0, 0, 6, 6});
+  CHECK(picture(0, 0) == example::detail::background);
+  CHECK(picture(1, 1) == example::detail::body_edge);
+  CHECK(picture(2, 2) == example::detail::body_edge);  // nearer than what is right of it
+  CHECK(picture(2, 3) == example::detail::body);       // farther than what is left of it
+  CHECK((example::detail::bodies_from_depth(depth, {2, 2, 2, 3}) == picture.block(2, 2, 2, 3)).all());
 }
 
 TEST_CASE("tracking report: figures read well") {
-  CHECK(detail::figure(0.12345, 3) == "0.123");
-  CHECK(detail::figure(-1234.5, 1) == "\u22121234.5");
-  CHECK(detail::figure(-12345678, 0) == "\u221212\u202f345\u202f678");
-  CHECK(detail::figure(-0.0001, 1) == "0.0");
-  CHECK(detail::figure(std::numeric_limits<double>::quiet_NaN(), 1) == "\u2013");
+  CHECK(example::detail::figure(0.12345, 3) == "0.123");
+  CHECK(example::detail::figure(-1234.5, 1) == "\u22121234.5");
+  CHECK(example::detail::figure(-12345678, 0) == "\u221212\u202f345\u202f678");
+  CHECK(example::detail::figure(-0.0001, 1) == "0.0");
+  CHECK(example::detail::figure(std::numeric_limits<double>::quiet_NaN(), 1) == "\u2013");
 }

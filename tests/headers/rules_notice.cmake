@@ -19,6 +19,7 @@ foreach(line IN ITEMS "#include <iostream>" "#include <fstream>" "inline void f(
         "#include <png.h>" "#include <decant/io/scene.hpp>" "#include <nanoflann.hpp>" "#include <omp.h>"
         "#include <mpi.h>" "#include <decant/hypothesis/mpi_executor.hpp>"
         "#pragma omp parallel for" "using namespace std" "#define SQUARE(x) x" "#define DECANT_SQUARE(x) x"
+        "inline Eigen::Vector3d f();" "std::vector<int> f();" "double f(double x) { return std::sqrt(x), }"
         "namespace decant {" "namespace decant::detail {" "namespace decant::inline DECANT_TARGET {")
   try(core/part.hpp "${start}${line}\n" TRUE)
 endforeach()
@@ -31,4 +32,6 @@ try(io/part.hpp "${start}#include <fstream>\n" FALSE)
 try(version.hpp "${start}#define DECANT_VERSION 1\n" FALSE)
 try(neighbor/kd_tree.hpp "${start}#include <nanoflann.hpp>\n" FALSE)
 try(hypothesis/mpi_executor.hpp "${start}#include <mpi.h>\n" FALSE)
+try(core/part.hpp "${start}#include <vector>\nstd::vector<int> f()\n" FALSE)
+try(core/part.hpp "${start}#include <decant/core/types.hpp>\nEigen::Vector3d f()\n" FALSE)
 try(core/parallel.hpp "${start}#include <omp.h>\n" FALSE)

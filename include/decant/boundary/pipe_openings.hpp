@@ -199,7 +199,9 @@ class OpenSky {
   }
 
   void look_along(const std::array<int, 3>& d, std::vector<std::uint8_t>& sees) const {
-    const auto& [dx, dy, dz] = d;
+    const int dx = d[0];  // no structured binding: Clang before 16 does not let a lambda capture one
+    const int dy = d[1];
+    const int dz = d[2];
     const std::ptrdiff_t there = step(dx, dy, dz);
     // What the straight way passes between; one that is free is enough for no surface to be in the way.
     std::vector<std::ptrdiff_t> between;

@@ -4,6 +4,7 @@
 /// Neighbours from a k-d tree (nanoflann 1.4 or later): the only header that includes nanoflann, and not part of
 /// decant.hpp.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
