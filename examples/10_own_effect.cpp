@@ -10,6 +10,9 @@
 #include <vector>
 
 #include <decant/decant.hpp>
+#include <decant/discovery/liquid_effects.hpp>
+#include <decant/discovery/missing_effect.hpp>
+#include <decant/discovery/simulated_interaction.hpp>
 
 using namespace decant;
 

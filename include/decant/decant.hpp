@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// Everything but io/, testing/, hypothesis/mpi_executor.hpp and neighbor/kd_tree.hpp.
+/// Everything but io/, testing/, hypothesis/mpi_executor.hpp and neighbor/kd_tree.hpp, and but discovery/, which takes
+/// longer to compile than all else: see discovery/missing_effect.hpp.
 
 #include <decant/boundary/body_shape.hpp>
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
@@ -66,30 +67,6 @@
 #include <decant/coverage/mask_cleaning.hpp>
 #include <decant/coverage/silhouette_distance.hpp>
 #include <decant/coverage/warp_sum.hpp>
-#include <decant/discovery/compared_recordings.hpp>
-#include <decant/discovery/disagreement.hpp>
-#include <decant/discovery/effect.hpp>
-#include <decant/discovery/effect_curve.hpp>
-#include <decant/discovery/effect_dictionary.hpp>
-#include <decant/discovery/effect_evidence.hpp>
-#include <decant/discovery/effect_judgement.hpp>
-#include <decant/discovery/effect_location.hpp>
-#include <decant/discovery/effect_refinement.hpp>
-#include <decant/discovery/effect_refiner.hpp>
-#include <decant/discovery/forward_model.hpp>
-#include <decant/discovery/interaction_runs.hpp>
-#include <decant/discovery/liquid_effects.hpp>
-#include <decant/discovery/missing_effect.hpp>
-#include <decant/discovery/missing_effect_result.hpp>
-#include <decant/discovery/missing_effect_settings.hpp>
-#include <decant/discovery/next_interaction.hpp>
-#include <decant/discovery/nuisance_space.hpp>
-#include <decant/discovery/silhouette_features.hpp>
-#include <decant/discovery/silhouette_gap.hpp>
-#include <decant/discovery/silhouette_series.hpp>
-#include <decant/discovery/simulated_interaction.hpp>
-#include <decant/discovery/smallest_seen.hpp>
-#include <decant/discovery/strength_profile.hpp>
 #include <decant/force/back_pressure.hpp>
 #include <decant/force/body_acceleration.hpp>
 #include <decant/force/concept.hpp>
