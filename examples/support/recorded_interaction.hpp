@@ -122,6 +122,8 @@ inline std::string fingerprint(const std::vector<std::string>& sources, const Re
     add(each);
   }
   const auto number = [&](double value) { add(decant::detail::number_text(value) + ' '); };
+  // places are worked out from meshes: a compiler's own rounding is no other model (and -0 no other number than 0)
+  const auto rounded = [&](double value) { number(std::round(1e9 * value) / 1e9 + 0.0); };
   for (const decant::Effect& effect : model.effects()) {
     add(effect.words());
     for (const decant::EffectComponent& each : effect.components) {
@@ -131,10 +133,10 @@ inline std::string fingerprint(const std::vector<std::string>& sources, const Re
       number(each.tolerance);
     }
     for (const double x : effect.place.value_or(decant::Vector3<double>::Zero())) {
-      number(x);
+      rounded(x);
     }
-    number(effect.window.value_or(decant::TimeWindow{}).from);
-    number(effect.window.value_or(decant::TimeWindow{}).until);
+    rounded(effect.window.value_or(decant::TimeWindow{}).from);
+    rounded(effect.window.value_or(decant::TimeWindow{}).until);
   }
   number(model.settings().spacing);
   number(model.settings().jitter);

@@ -172,6 +172,23 @@ TEST_CASE("missing effect: what an effect explains by its curve, and runs with i
   CHECK(large >= 1);
 }
 
+TEST_CASE("missing effect: where all else may be chance, what an effect takes away needs to be no share of a gap") {
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
+  MissingEffectSettings settings;
+  settings.judgement.fall_factor = 1;
+  const Jet a_little_of_each{0.19, 0.15, 0.99, 0.0037};
+  const MissingEffect result = MissingEffectSearch<JetModel>({{"a", &model, film_of(a_little_of_each, 421, 0.9)}}, {},
+                                                             run_jobs_on(executor), settings)
+                                   .find();
+  REQUIRE(result.learn.before < result.judgement.chance.largest_distance);
+  REQUIRE(!result.refined.empty());
+  CHECK(result.refined.front().share < settings.least_share_to_chance);
+  CHECK(relative_fall(result.learn.before, result.refined.front().distance) > result.learn.by_chance);
+  CHECK((result.verdict == Verdict::Named || result.verdict == Verdict::OneOf));
+  CHECK(name_of(result) == "speed");
+}
+
 TEST_CASE("missing effect: each is named with its strength, and confirmed where it was not looked at") {
   struct Case {
     Jet jet;

@@ -140,7 +140,9 @@ class MissingEffectSearch {
           down_to_chance ? settings_.least_share_to_chance : 1 - (1 - settings_.least_share) / together;
       const bool leaves_little =
           !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
-      const bool explains = leaves_little && refined.front().share >= least;
+      // where all that is left may be chance, there is no gap but what an effect takes away, nor a share of one
+      const bool faint = result.learn.before <= known.chance.largest_distance;
+      const bool explains = leaves_little && (faint || refined.front().share >= least);
       if (round == 0) {
         // what effects explain by curves through few runs, and do not in runs with them, is no gap
         gap_stands = judgement.distance > known.chance.largest_distance || gains;

@@ -23,7 +23,8 @@ struct MissingEffectSettings {
   int refinement_seeds = 2;            ///< runs at each point, >= 1
   double least_share = 0.7;            ///< of what is reducible an effect has to explain in the end, 0 .. 1; several
                                        ///< together may leave so many times less
-  double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1
+  double least_share_to_chance = 0.5;  ///< the same where no more is left than chance leaves, 0 .. 1; where even
+                                       ///< without it no more is left, it has to take away more than chance does
   double most_left = 5;           ///< over what chance leaves at most, > 0: what leaves more of a gap does not explain
                                   ///< it, whatever its share. Effects of a simulation are not those of reality to
                                   ///< the last cell; where a model is as exact as its sensors ask for 1 to 2
