@@ -363,7 +363,9 @@ inline ExperimentSection calibration(const std::vector<EffectScore>& scores) {
     }
     std::map<std::string, double> said;
     for (const nlohmann::json& found : each.result->at("refined")) {
-      said[family_of(found.at("effect"))] += number_at(found, "/probability");
+      // it is the answer's: each effect of one, and each place of one, has the same
+      double& probability = said[family_of(found.at("effect"))];
+      probability = std::max(probability, number_at(found, "/probability"));
     }
     for (const auto& [family, probability] : said) {
       if (!(probability > 0.01)) {
