@@ -113,7 +113,9 @@ struct Judgement {
   std::vector<EffectStanding> standings{};  ///< all that something is known of, the best first
   double distance = 0;                      ///< of the model as it is
   ChanceLevel chance{};
-  bool has_gap() const noexcept { return distance > chance.largest_distance || fall() > chance.fall; }
+  /// Whether all of the distance may be chance: then only what an effect takes away may be a gap.
+  bool is_faint() const noexcept { return !(distance > chance.largest_distance); }
+  bool has_gap() const noexcept { return !is_faint() || fall() > chance.fall; }
   /// The largest of any effect.
   double fall() const noexcept {
     double best = 0;
@@ -275,7 +277,7 @@ inline Judgement judge_effects(const std::vector<Effect>& effects, const std::ve
   std::stable_sort(result.standings.begin(), result.standings.end(),
                    [](const auto& a, const auto& b) { return a.vote > b.vote; });
   if (result.standings.empty()) {
-    result.verdict = result.distance > chance.largest_distance ? Verdict::Unexplained : Verdict::Nothing;
+    result.verdict = result.is_faint() ? Verdict::Nothing : Verdict::Unexplained;
     return result;
   }
   if (!result.has_gap()) {

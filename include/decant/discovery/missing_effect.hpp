@@ -140,12 +140,12 @@ class MissingEffectSearch {
           down_to_chance ? settings_.least_share_to_chance : 1 - (1 - settings_.least_share) / together;
       const bool leaves_little =
           !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
-      // where all that is left may be chance, there is no gap but what an effect takes away, nor a share of one
-      const bool faint = result.learn.before <= known.chance.largest_distance;
+      // where all of a recording's distance may be chance, there is no gap but what an effect takes away, nor a share
+      const bool faint = result.judgement.is_faint();
       const bool explains = leaves_little && (faint || refined.front().share >= least);
       if (round == 0) {
         // what effects explain by curves through few runs, and do not in runs with them, is no gap
-        gap_stands = judgement.distance > known.chance.largest_distance || gains;
+        gap_stands = !faint || gains;
         std::vector<Evidence> evidence;
         for (const RefinedTogether& each : refined) {
           result.refined.push_back(each.effects.front());
