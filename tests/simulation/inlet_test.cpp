@@ -3,7 +3,9 @@
 
 #include <decant/simulation/inlet.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include <decant/simulation/simulator.hpp>
@@ -11,6 +13,7 @@
 #include "catch.hpp"
 
 using namespace decant;
+using std::numbers::pi;
 
 namespace {
 
@@ -52,11 +55,11 @@ TEST_CASE("inlet: volume delivered is the integral of the flow within one layer"
       const Index before = count;
       inlet.advance(t, step, [&](const Vector3<double>& x, const Vector3<double>& v) {
         ++count;
-        REQUIRE(std::hypot(x[0] - 0.1, x[1] - 0.2) <= 0.01 + 1e-12);
-        // plug flow over the layer's area
-        REQUIRE(-v[2] == Approx(inlet.flow(t + 0.5 * step) / (static_cast<double>(layer) * spacing * spacing)));
+        REQUIRE(std::hypot(x[0] - 0.1, x[1] - 0.2) <= 0.01 + 0.5 * spacing);
+        // plug flow over the opening
+        REQUIRE(-v[2] == Approx(inlet.flow(t + 0.5 * step) / (pi * 0.01 * 0.01)));
         REQUIRE(x[2] <= 0.3 + 1e-12);
-        REQUIRE(0.3 - x[2] <= -v[2] * step + spacing);
+        REQUIRE(0.3 - x[2] <= -v[2] * step + 1.5 * spacing);
       });
       CHECK((count - before) % layer == 0);
       integral += step * inlet.flow(t + 0.5 * step);
@@ -68,23 +71,34 @@ TEST_CASE("inlet: volume delivered is the integral of the flow within one layer"
   }
 }
 
-TEST_CASE("inlet: layers of a steady flow are one spacing apart") {
-  const double spacing = 0.004;
-  Inlet inlet(pouring({{0, 3e-5}, {10, 3e-5}}), spacing);
-  std::vector<double> passed;  // when each layer was at the opening
-  for (double t = 0; t < 1; t += 0.0031) {
-    double last = -1;
-    inlet.advance(t, 0.0031, [&](const Vector3<double>& x, const Vector3<double>& v) {
-      const double when = t + 0.0031 - (0.3 - x[2]) / -v[2];
-      if (when != last) {
-        passed.push_back(when * -v[2]);
-        last = when;
-      }
-    });
-  }
-  REQUIRE(passed.size() > 10);
-  for (std::size_t k = 1; k < passed.size(); ++k) {
-    REQUIRE(passed[k] - passed[k - 1] == Approx(spacing).epsilon(1e-6));
+TEST_CASE("inlet: the jet is the same at every spacing and has the liquid's density") {
+  // its speed is flow / (pi radius^2); each particle fills its own volume, whether few or many make a layer
+  for (const double spacing : {0.0017, 0.004, 0.0043, 0.005, 0.007, 0.012, 0.03}) {
+    INFO("spacing " << spacing);
+    Inlet inlet(pouring({{0, 3e-5}, {100, 3e-5}}), spacing);
+    CHECK(inlet.speed(1) == Approx(3e-5 / (pi * 1e-4)));
+    std::vector<double> passed;  // how far the jet had come when each layer was at the opening [m]
+    double widest = 0;
+    Index count = 0;
+    for (double t = 0; passed.size() < 12; t += 0.0031) {
+      double last = -1;
+      inlet.advance(t, 0.0031, [&](const Vector3<double>& x, const Vector3<double>& v) {
+        const double when = t + 0.0031 - (0.3 - x[2]) / -v[2];
+        if (when != last) {
+          passed.push_back(when * -v[2]);
+          last = when;
+        }
+        widest = std::max(widest, std::hypot(x[0] - 0.1, x[1] - 0.2));
+        ++count;
+      });
+    }
+    const double apart = (passed.back() - passed.front()) / static_cast<double>(passed.size() - 1);
+    for (std::size_t k = 1; k < passed.size(); ++k) {
+      REQUIRE(passed[k] - passed[k - 1] == Approx(apart).epsilon(1e-6));
+    }
+    const double particles = static_cast<double>(count) / static_cast<double>(passed.size());
+    CHECK(particles * std::pow(spacing, 3) == Approx(apart * pi * 1e-4));
+    CHECK(widest <= 0.01 + 0.5 * spacing);
   }
 }
 

@@ -317,11 +317,11 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
       std::move(effect), EffectKind::Physics, [origin](const AppliedEffect& as, InteractionChanges<Model>& changes) {
         InletSettings inlet;
         inlet.position = *as.place;
+        inlet.radius = 0.0064;  // of a half-inch hose: how wide it is nobody knows, and the same at every spacing
         changes.of_model.push_back([inlet, origin, as, first = changes.first](Model& model) {
           InletSettings own = inlet;
           own.flow = detail::steady(as.strength[0], in_model_time(*as.window, model, first));
           own.direction = model.settings().gravity;
-          own.radius = model.spacing();
           model.add_inlet(own, origin);
         });
       });

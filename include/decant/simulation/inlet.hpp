@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -20,33 +20,41 @@ namespace decant::inline DECANT_TARGET {
 struct InletSettings {
   Vector3<double> position = Vector3<double>::Zero();     ///< centre of the opening, world frame [m]
   Vector3<double> direction = -Vector3<double>::UnitZ();  ///< of the flow; normalised
-  double radius = 0.01;                                   ///< of the opening [m], > 0
+  double radius = 0.01;                                   ///< of the opening [m], > 0.01 spacings
   std::vector<std::pair<double, double>> flow{};          ///< (time [s], flow [m^3/s]), linear between, 0 outside
 };
 
-/// Hands out layers of particles, one spacing thick, whenever enough volume has come in. Plug flow: each layer leaves
-/// with the speed that the flow has over the opening, so that successive layers are one spacing apart.
+/// Hands out layers of particles whenever enough volume has come in. Plug flow: each leaves with the speed that the flow
+/// has over the opening. A lattice covers no circle exactly; its places are spread, and the layers' distance chosen, so
+/// that each particle has its share of the circle and fills its own volume: the jet is the same at every spacing.
 class Inlet {
  public:
   /// @param spacing particle spacing [m].
-  Inlet(InletSettings settings, double spacing) : settings_(std::move(settings)), spacing_(spacing) {
+  Inlet(InletSettings settings, double spacing) : settings_(std::move(settings)) {
     expects(settings_.position.allFinite(), "Inlet: position [m]", "finite", settings_.position.transpose());
     expects(settings_.direction.allFinite() && settings_.direction.norm() > 1e-9, "Inlet: direction",
             "a finite vector other than zero", settings_.direction.transpose());
-    expects(settings_.radius > 0 && settings_.radius < 1e3 * spacing, "Inlet: radius [m]",
-            "> 0 and below 1000 spacings", settings_.radius);
+    expects(settings_.radius > 0.01 * spacing && settings_.radius < 1e3 * spacing, "Inlet: radius [m]",
+            "between 0.01 and 1000 spacings", settings_.radius);
     detail::expects_flow("Inlet", settings_.flow);
     settings_.direction.normalize();
     const Vector3<double> across = settings_.direction.unitOrthogonal();
     const Vector3<double> along = settings_.direction.cross(across);
-    const int reach = static_cast<int>(std::ceil(settings_.radius / spacing));
+    const double radius = settings_.radius;
+    const int reach = static_cast<int>(std::ceil(radius / spacing));
     for (int i = -reach; i <= reach; ++i) {
       for (int j = -reach; j <= reach; ++j) {
         const Vector3<double> offset = spacing * (i * across + j * along);
-        if (offset.norm() <= settings_.radius) {
-          layer_.push_back(settings_.position + offset);
+        if (offset.norm() <= radius) {
+          layer_.push_back(offset);
         }
       }
+    }
+    opening_ = std::numbers::pi * radius * radius;
+    thickness_ = static_cast<double>(layer_.size()) * spacing * spacing * spacing / opening_;
+    const double spread = std::sqrt(spacing / thickness_);
+    for (Vector3<double>& place : layer_) {
+      place = settings_.position + spread * place;
     }
   }
 
@@ -54,20 +62,17 @@ class Inlet {
   double flow(double time) const noexcept { return detail::flow_at(settings_.flow, time); }
 
   /// Of the liquid that comes in [m/s].
-  double speed(double time) const noexcept {
-    return flow(time) / (static_cast<double>(layer_.size()) * spacing_ * spacing_);
-  }
+  double speed(double time) const noexcept { return flow(time) / opening_; }
 
   /// Lets time pass; calls emit(position, velocity) for each particle that has come in meanwhile.
   template <class Emit>
   void advance(double time, double time_step, Emit&& emit) {
-    const double opening = static_cast<double>(layer_.size()) * spacing_ * spacing_;
     const Vector3<double> velocity = speed(time + 0.5 * time_step) * settings_.direction;
     pending_ += flow(time + 0.5 * time_step) * time_step;
-    while (pending_ >= opening * spacing_) {
-      pending_ -= opening * spacing_;
+    while (pending_ >= opening_ * thickness_) {
+      pending_ -= opening_ * thickness_;
       // the layer passed the opening a moment ago; what came in after it fills the space between
-      const Vector3<double> travelled = pending_ / opening * settings_.direction;
+      const Vector3<double> travelled = pending_ / opening_ * settings_.direction;
       for (const Vector3<double>& place : layer_) {
         emit(Vector3<double>(place + travelled), velocity);
       }
@@ -84,8 +89,9 @@ class Inlet {
 
  private:
   InletSettings settings_;
-  double spacing_;
-  double pending_ = 0;  ///< volume that came in since the last layer [m^3]
+  double opening_ = 0;    ///< its area [m^2]
+  double thickness_ = 0;  ///< of a layer [m]
+  double pending_ = 0;    ///< volume that came in since the last layer [m^3]
   std::vector<Vector3<double>> layer_{};
 };
 
