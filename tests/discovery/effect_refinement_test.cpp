@@ -105,6 +105,27 @@ TEST_CASE("effect point: strengths, places and times of several effects are one 
   CHECK(point.step(2) == Approx(0.016));
   CHECK(point.step(5) == Approx(0.2));
   CHECK(point.step(9) == Approx(0.08));
+
+  // steps of places and times are halved, and what is held is not tried any more; strengths keep theirs
+  EffectPoint finer = point;
+  const double of_strength = point.step(1);
+  finer.refine(2);
+  finer.refine(9);
+  finer.refine(9);
+  finer.hold(4);
+  CHECK(finer.step(2) == Approx(0.008));
+  CHECK(finer.step(3) == Approx(0.016));
+  CHECK(finer.step(9) == Approx(0.02));
+  CHECK(finer.step(4) == 0);
+  CHECK(finer.step(1) == of_strength);
+  CHECK(finer.is_held(4));
+  CHECK(point.moving() == 10);
+  CHECK(finer.moving() == 9);
+  CHECK(finer.with(4, 0.31).is_held(4));
+  CHECK(finer.is_place_or_time(4));
+  CHECK(finer.is_place_or_time(8));
+  CHECK_FALSE(finer.is_place_or_time(1));
+  CHECK_FALSE(finer.is_place_or_time(7));
 }
 
 TEST_CASE("effect point: what is not looked for is no number of it") {
@@ -178,6 +199,32 @@ TEST_CASE("refinement: chaos in slopes makes steps shorter, unless it is taken o
   }
   CHECK(as_it_is == Approx(0.5 * move).epsilon(0.1));
   CHECK(without_chaos == Approx(move).epsilon(0.1));
+}
+
+TEST_CASE("refinement: a place that changes no more than chaos does stays where it is") {
+  Effect tap = named("tap", {{"", 0, 0, 40}});
+  tap.place = Vector3<double>(0, 0, 0);
+  tap.place_tolerance = 0.04;
+  EffectPoint point;
+  point.add(tap, 0, {0, numbers({20})});
+  NormalMatrices draw(13);
+  const NuisanceSpace space = independent_features(draw);
+  // x tells, y is chaos alone, z says as little; something is off that is of none of them
+  Eigen::MatrixXd slope = Eigen::MatrixXd::Zero(400, 4);
+  slope.col(0) = 0.1 * draw(400, 1);
+  slope.col(1) = 400 * draw(400, 1);
+  const double chaos = space.distance(space.standardised_difference(100 * draw(400, 1)));
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    RefinementView view{&space, draw(400, 1), slope};
+    view.slope.rightCols(3) += 100 * draw(400, 3);
+    view.chaos = numbers({0, chaos, chaos, chaos});
+    CHECK(tells({view}, 1));
+    CHECK_FALSE(tells({view}, 2));
+    const Eigen::VectorXd move = refinement(point, {view}, {view.middle + slope.col(1) * 0.01 + 4 * draw(400, 1)});
+    CHECK(move[1] == Approx(0.01).margin(0.003));
+    CHECK(move[2] == 0);
+    CHECK(move[3] == 0);
+  }
 }
 
 TEST_CASE("refinement: of two effects that do nearly the same, their sum is told where each is not") {

@@ -392,6 +392,7 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
     REQUIRE(tap.place);
     CHECK(tap.place->x() == Approx(0.3).margin(0.04));  // a third of the squares that are compared
     CHECK(tap.place->y() == Approx(0.65).margin(0.04));
+    CHECK(tap.place->z() == 0);  // which films do not show: chaos alone does not move it
     CHECK(tap.strength[0] == Approx(25).epsilon(0.2));
     const MissingEffect other = found(WithoutTap(0.9, usual), seed);
     CHECK(other.verdict == Verdict::Unexplained);

@@ -47,6 +47,7 @@ class EffectPoint {
     part.begins = timed && std::isfinite(window.from) ? 1 : 0;
     part.ends = timed && std::isfinite(window.until) ? 1 : 0;
     value_.conservativeResize(value_.size() + part.size());
+    fineness_.resize(static_cast<std::size_t>(value_.size()), 1);
     value_.segment(part.begin, components) = guess.strength;
     if (part.coordinates > 0) {
       value_.segment<3>(part.place()) = place;
@@ -81,14 +82,15 @@ class EffectPoint {
     return result;
   }
 
+  /// Whether a number is part of a place or a time, rather than of a strength.
+  bool is_place_or_time(Eigen::Index k) const { return k >= part_of(k).place(); }
+
   /// How far off a number is tried to see what it changes.
   double step(Eigen::Index k) const {
     const Part& of = part_of(k);
-    if (k >= of.time()) {
-      return 0.4 * of.effect->window_tolerance;
-    }
     if (k >= of.place()) {
-      return 0.4 * of.effect->place_tolerance;
+      const double tolerance = k >= of.time() ? of.effect->window_tolerance : of.effect->place_tolerance;
+      return 0.4 * tolerance * fineness_[static_cast<std::size_t>(k)];
     }
     const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
     return std::max({0.3 * std::abs(value_[k] - component.base), 0.05 * (component.high - component.low),
@@ -116,6 +118,16 @@ class EffectPoint {
     const auto [low, high] = range(k);
     other.value_[k] = std::clamp(value, low, high);
     return other;
+  }
+
+  /// Tries a number of a place or a time half as far off from now on.
+  void refine(Eigen::Index k) { fineness_.at(static_cast<std::size_t>(k)) *= 0.5; }
+  /// A number of a place or a time stays where it is from now on: its step is none.
+  void hold(Eigen::Index k) { fineness_.at(static_cast<std::size_t>(k)) = 0; }
+  bool is_held(Eigen::Index k) const { return fineness_.at(static_cast<std::size_t>(k)) == 0; }
+  /// How many numbers are not held.
+  std::size_t moving() const {
+    return fineness_.size() - static_cast<std::size_t>(std::count(fineness_.begin(), fineness_.end(), 0.0));
   }
 
   /// With all numbers as multiples of a ten-millionth of their range. Sums differ in their last digit with where memory
@@ -160,6 +172,7 @@ class EffectPoint {
 
   std::vector<Part> parts_{};
   Eigen::VectorXd value_{};
+  std::vector<double> fineness_{};  ///< by number: of a place's or a time's the step, over the one to begin with
 };
 
 /// What a recording's simulations say around a point. Features are as they are, not standardised.
@@ -170,6 +183,17 @@ struct RefinementView {
   Eigen::MatrixXd below{}, above{};  ///< p x size of the point: one step off in each of its numbers
   Eigen::VectorXd chaos{};           ///< by number: how large a slope is by chaos alone, as a distance; none if empty
 };
+
+/// Whether what a number changes stands out from what chaos makes of slopes, in all recordings together.
+inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number) {
+  constexpr double enough = 2;
+  double energy = 0, chaos = 0;
+  for (const RefinementView& view : views) {
+    energy += view.space->distance(view.space->standardised_difference(view.slope.col(number)));
+    chaos += view.chaos.size() > 0 ? view.chaos[number] : 0;
+  }
+  return energy >= enough * chaos;
+}
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
@@ -202,7 +226,14 @@ inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<Refin
       chaos[i] += view.chaos.size() > 0 ? unit[i] * unit[i] * view.chaos[i] : 0;
     }
   }
-  // what changes nothing stays where it is
+  // what changes nothing stays where it is, and so does a place or a time that changes no more than chaos does
+  for (Eigen::Index k = 0; k < size; ++k) {
+    if (at.is_place_or_time(k) && !tells(views, k)) {
+      curvature.row(k).setZero();
+      curvature.col(k).setZero();
+      answer[k] = 0;
+    }
+  }
   curvature.diagonal().array() += 1e-2 * curvature.diagonal().maxCoeff() + 1e-12;
   Eigen::VectorXd move;
   if (without_chaos) {

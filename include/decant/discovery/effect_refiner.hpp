@@ -309,8 +309,10 @@ class EffectRefiner {
       for (const Interaction<Model>& of : *of_) {
         ask(of, point, middle_seeds());
         for (Eigen::Index k = 0; k < point.size(); ++k) {
-          ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
-          ask(of, point.with(k, point.value()[k] + point.step(k)), slope_seeds(point));
+          if (!point.is_held(k)) {
+            ask(of, point.with(k, point.value()[k] - point.step(k)), slope_seeds(point));
+            ask(of, point.with(k, point.value()[k] + point.step(k)), slope_seeds(point));
+          }
         }
       }
     }
@@ -325,7 +327,7 @@ class EffectRefiner {
         if (auto view = view_of(each.point, recorded, next)) {
           each.views.push_back(std::move(*view));
         }
-        next += middle_seeds() + slope_seeds(each.point) * static_cast<std::size_t>(2 * each.point.size());
+        next += middle_seeds() + slope_seeds(each.point) * 2 * each.point.moving();
       }
       if (each.views.size() < known.recorded.size()) {
         each.views.clear();
@@ -375,6 +377,9 @@ class EffectRefiner {
     const double more =
         chaotic / static_cast<double>(slope_seeds(candidate.point)) - chaotic / static_cast<double>(middle_seeds());
     for (Eigen::Index number = 0; number < next.size(); ++number) {
+      if (candidate.point.is_held(number)) {
+        continue;
+      }
       for (const int side : {-1, 1}) {
         const double there = mean_distance([&](const View& view, const Features& own) -> Features {
                                return own - (side < 0 ? view.below : view.above).col(number);
@@ -386,11 +391,41 @@ class EffectRefiner {
         }
       }
     }
-    candidate.settled = relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
+    const bool is_finer = set_steps(candidate, next);
+    candidate.settled = !is_finer && relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
     candidate.point = next.rounded();
   }
 
-  /// @param seen of runs at the point, then below and above of each of its numbers.
+  /// Of places and times. What changes no more than chaos does is held: one camera may not tell how far off something
+  /// is. A step of what hardly moves any more is halved, as long as half of it tells four times as much as chaos does:
+  /// a jet that is moved by more than its width says nothing of which way to go.
+  /// @return whether any was halved.
+  static bool set_steps(const Candidate& candidate, EffectPoint& next) {
+    constexpr double enough = 4;
+    bool is_finer = false;
+    for (Eigen::Index k = 0; k < next.size(); ++k) {
+      if (!next.is_place_or_time(k) || next.is_held(k)) {
+        continue;
+      }
+      if (!tells(candidate.views, k)) {
+        next.hold(k);
+        continue;
+      }
+      double energy = 0, chaos = 0;  // of half a step, per unit of the number
+      for (const RefinementView& view : candidate.views) {
+        energy += 0.25 * (view.space->distance(view.space->standardised_difference(view.slope.col(k))) - view.chaos[k]);
+        chaos += view.chaos[k];
+      }
+      const double moved = std::abs(next.value()[k] - candidate.point.value()[k]);
+      if (moved < 0.5 * candidate.point.step(k) && energy > enough * chaos) {
+        next.refine(k);
+        is_finer = true;
+      }
+    }
+    return is_finer;
+  }
+
+  /// @param seen of runs at the point, then below and above of each of its numbers that is not held.
   std::optional<RefinementView> view_of(const EffectPoint& point, const RecordedEvidence& recorded,
                                         const Observation* seen) const {
     const std::size_t seeds = slope_seeds(point);
@@ -405,6 +440,13 @@ class EffectRefiner {
       each->resize(middle->size(), point.size());
     }
     for (Eigen::Index k = 0; k < point.size(); ++k) {
+      if (point.is_held(k)) {
+        view.slope.col(k).setZero();
+        view.chaos[k] = 0;
+        view.below.col(k) = *middle;
+        view.above.col(k) = *middle;
+        continue;
+      }
       const auto below = recorded.mean_features({seen, seeds});
       seen += seeds;
       const auto above = recorded.mean_features({seen, seeds});

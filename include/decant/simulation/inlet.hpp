@@ -24,9 +24,10 @@ struct InletSettings {
   std::vector<std::pair<double, double>> flow{};          ///< (time [s], flow [m^3/s]), linear between, 0 outside
 };
 
-/// Hands out layers of particles whenever enough volume has come in. Plug flow: each leaves with the speed that the flow
-/// has over the opening. A lattice covers no circle exactly; its places are spread, and the layers' distance chosen, so
-/// that each particle has its share of the circle and fills its own volume: the jet is the same at every spacing.
+/// Hands out layers of particles whenever enough volume has come in. Plug flow: each leaves with the speed that the
+/// flow has over the opening. A lattice covers no circle exactly; its places are spread, and the layers' distance
+/// chosen, so that each particle has its share of the circle and fills its own volume: the jet is the same at every
+/// spacing.
 class Inlet {
  public:
   /// @param spacing particle spacing [m].
