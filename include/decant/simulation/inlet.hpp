@@ -3,9 +3,10 @@
 
 /// Liquid that pours in from a round opening.
 
-#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -24,10 +25,10 @@ struct InletSettings {
   std::vector<std::pair<double, double>> flow{};          ///< (time [s], flow [m^3/s]), linear between, 0 outside
 };
 
-/// Hands out layers of particles whenever enough volume has come in. Plug flow: each leaves with the speed that the
-/// flow has over the opening. A lattice covers no circle exactly; its places are spread, and the layers' distance
-/// chosen, so that each particle has its share of the circle and fills its own volume: the jet is the same at every
-/// spacing.
+/// Hands out particles one by one, each as soon as its volume has come in, in turn at places all over the opening: a
+/// jet that gets thin as it falls does not fall apart into slices. Plug flow: each leaves with the speed that the flow
+/// has over the opening. A lattice covers no circle exactly, so its places are spread until each has its share of the
+/// circle: the jet is the same at every spacing.
 class Inlet {
  public:
   /// @param spacing particle spacing [m].
@@ -43,19 +44,26 @@ class Inlet {
     const Vector3<double> along = settings_.direction.cross(across);
     const double radius = settings_.radius;
     const int reach = static_cast<int>(std::ceil(radius / spacing));
+    std::vector<Vector3<double>> offsets;
     for (int i = -reach; i <= reach; ++i) {
       for (int j = -reach; j <= reach; ++j) {
         const Vector3<double> offset = spacing * (i * across + j * along);
         if (offset.norm() <= radius) {
-          layer_.push_back(offset);
+          offsets.push_back(offset);
         }
       }
     }
     opening_ = std::numbers::pi * radius * radius;
-    thickness_ = static_cast<double>(layer_.size()) * spacing * spacing * spacing / opening_;
-    const double spread = std::sqrt(spacing / thickness_);
-    for (Vector3<double>& place : layer_) {
-      place = settings_.position + spread * place;
+    volume_ = spacing * spacing * spacing;
+    const std::size_t count = offsets.size();
+    const double spread = std::sqrt(opening_ / static_cast<double>(count)) / spacing;
+    // places that follow each other are far apart: so many on as the golden section of them, or the next that meets all
+    auto stride = static_cast<std::size_t>(std::lround(0.618 * static_cast<double>(count)));
+    while (std::gcd(stride, count) != 1) {
+      ++stride;
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      places_.push_back(settings_.position + spread * offsets[k * stride % count]);
     }
   }
 
@@ -70,13 +78,11 @@ class Inlet {
   void advance(double time, double time_step, Emit&& emit) {
     const Vector3<double> velocity = speed(time + 0.5 * time_step) * settings_.direction;
     pending_ += flow(time + 0.5 * time_step) * time_step;
-    while (pending_ >= opening_ * thickness_) {
-      pending_ -= opening_ * thickness_;
-      // the layer passed the opening a moment ago; what came in after it fills the space between
-      const Vector3<double> travelled = pending_ / opening_ * settings_.direction;
-      for (const Vector3<double>& place : layer_) {
-        emit(Vector3<double>(place + travelled), velocity);
-      }
+    while (pending_ >= volume_) {
+      pending_ -= volume_;
+      // it passed the opening a moment ago; what came in after it is behind it
+      emit(Vector3<double>(places_[next_] + pending_ / opening_ * settings_.direction), velocity);
+      next_ = (next_ + 1) % places_.size();
     }
   }
 
@@ -90,10 +96,11 @@ class Inlet {
 
  private:
   InletSettings settings_;
-  double opening_ = 0;    ///< its area [m^2]
-  double thickness_ = 0;  ///< of a layer [m]
-  double pending_ = 0;    ///< volume that came in since the last layer [m^3]
-  std::vector<Vector3<double>> layer_{};
+  double opening_ = 0;  ///< its area [m^2]
+  double volume_ = 0;   ///< of a particle [m^3]
+  double pending_ = 0;  ///< volume that came in since the last particle [m^3]
+  std::vector<Vector3<double>> places_{};
+  std::size_t next_ = 0;
 };
 
 }  // namespace decant::inline DECANT_TARGET
