@@ -28,6 +28,7 @@ struct Jet {
   double gust = 0;                                 ///< [m/s^2], for a while only
   int fatter = 0;                                  ///< of what is drawn [px]
   double tap = 0, tap_x = 0, tap_y = 0;            ///< more balls, that drop from there: how many a second; [m]
+  double gust_from = 0.4, gust_until = 0.6;        ///< [s]
 };
 
 /// @param seed of where each ball leaves the nozzle, and how fast. @param angle of the nozzle [rad].
@@ -55,7 +56,7 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
   for (int frame = 0; frame < 16; ++frame) {
     const double time = frame / 15.0;
     for (; now < time - 1e-9; now += step) {
-      const double gust = now > 0.4 && now < 0.6 ? jet.gust : 0;
+      const double gust = now > jet.gust_from && now < jet.gust_until ? jet.gust : 0;
       for (Ball& ball : balls) {
         if (now >= ball.born) {
           ball.u += step * (jet.pull + gust - jet.drag * ball.u);

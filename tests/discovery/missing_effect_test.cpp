@@ -146,6 +146,56 @@ class WithoutTap : public LocatingJetModel {
   std::vector<Effect> effects_{LocatingJetModel::effects()};
 };
 
+/// Knows of a pull that lasts, of one that passes, usually early, and of a nozzle that is faster than assumed.
+class PullModel {
+ public:
+  static constexpr std::size_t passing = 1;
+
+  PullModel() {
+    const auto add = [&](const char* name, const EffectComponent& component) {
+      Effect& effect = effects_.emplace_back();
+      effect.name = name;
+      effect.unit = "m/s^2";
+      effect.components = {component};
+      return &effect;
+    };
+    add("pull", {"", 0, -1.5, 1.5, 0.05});
+    Effect& gust = *add("pull", {"", 0, -1.5, 1.5});
+    gust.where = "for a while";
+    gust.window = TimeWindow{0.15, 0.55};
+    gust.window_tolerance = 0.4;
+    add("speed", {"", 1, 0.85, 1.15, 0.01});
+  }
+
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    Jet jet;
+    std::mt19937 random(run.seed + 77);
+    for (std::size_t k = 0; k < effects_.size(); ++k) {
+      const double share = static_cast<double>(random()) / 2147483648.0 - 1;
+      set(jet, k, effects_[k].components[0].base + (run.tolerated ? share * effects_[k].components[0].tolerance : 0));
+    }
+    for (const AppliedEffect& applied : run.effects) {
+      set(jet, applied.effect, applied.strength[0]);
+      if (applied.effect == passing) {
+        const TimeWindow window = applied.window.value_or(*effects_[passing].window);
+        jet.gust_from = window.from;
+        jet.gust_until = window.until;
+      }
+    }
+    return film_of(jet, run.seed);
+  }
+
+ private:
+  static void set(Jet& jet, std::size_t effect, double strength) {
+    (effect == 0 ? jet.pull : effect == passing ? jet.gust : jet.speed) = strength;
+  }
+
+  std::vector<Effect> effects_{};
+};
+static_assert(ForwardModel<PullModel>);
+
 }  // namespace
 
 TEST_CASE("missing effect: what an effect explains by its curve, and runs with it do not bear out, is no gap") {
@@ -397,6 +447,33 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
     const MissingEffect other = found(WithoutTap(0.9, usual), seed);
     CHECK(other.verdict == Verdict::Unexplained);
     CHECK(other.judged.size() == 6);  // none where the recording begins to disagree
+  }
+}
+
+TEST_CASE(
+    "missing effect: what lasts for a while is told from what lasts, though it comes at another time than usual") {
+  // the whole time is nearer to when it is than its usual while
+  const PullModel model;
+  ThreadExecutor executor{{1}};
+  MissingEffectSettings settings;
+  settings.most_effects = 1;
+  for (const std::uint32_t seed : {71U, 72U, 73U}) {
+    Jet hidden;
+    hidden.gust = 1.2;
+    hidden.gust_from = 0.3;
+    hidden.gust_until = 0.8;
+    const MissingEffect found =
+        MissingEffectSearch<PullModel>({{"a", &model, film_of(hidden, seed)}}, {}, run_jobs_on(executor), settings)
+            .find();
+    REQUIRE(!found.refined.empty());
+    const RefinedEffect& pull = found.refined.front();
+    INFO("seed " << seed << ", left " << pull.distance << ", strength " << pull.strength[0]);
+    REQUIRE(pull.effect == PullModel::passing);
+    REQUIRE(pull.window);
+    CHECK(pull.window->from == Approx(0.3).margin(0.07));  // frames are as far apart
+    CHECK(pull.window->until == Approx(0.8).margin(0.1));
+    CHECK(pull.strength[0] == Approx(1.2).epsilon(0.2));
+    CHECK(found.verdict == Verdict::Named);
   }
 }
 

@@ -190,10 +190,15 @@ class EffectRefiner {
     return steps;
   }
 
-  /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places two of
-  /// them, by evidence. What lasts for a while explains more by chance than what lasts. Where what an effect does is
-  /// bent, as a front's is that comes later, a curve through few runs promises less than one of them has: answers that
-  /// come near the best by such a run are looked at from there on, although no curve has them among the best.
+  /// Whether one answer has several such effects: in different places, or for a while at different times. By a curve
+  /// none of them may be where, or when, it is.
+  static bool may_be_several(const Effect& effect) { return effect.place || effect.window; }
+
+  /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places, or at
+  /// several times, two of them, by evidence. What lasts for a while explains more by chance than what lasts. Where
+  /// what an effect does is bent, as a front's is that comes later, a curve through few runs promises less than one of
+  /// them has: answers that come near the best by such a run are looked at from there on, although no curve has them
+  /// among the best.
   std::vector<Candidate> chosen(const Judgement& judgement, const ComparedRecordings& known,
                                 const std::vector<RefinedEffect>& found) const {
     struct Instance {
@@ -234,7 +239,7 @@ class EffectRefiner {
       const std::vector<Instance>& instances = of_answer[answer];
       const std::size_t next = taken[answer];
       if (result.size() < static_cast<std::size_t>(settings_.refined) && next < instances.size() &&
-          next < (known.effects[instances[next].candidate.judged].place ? 2U : 1U)) {
+          next < (may_be_several(known.effects[instances[next].candidate.judged]) ? 2U : 1U)) {
         best = std::min(best, instances[next].distance);
         result.push_back(instances[next].candidate);
         ++taken[answer];
