@@ -114,9 +114,9 @@ class EffectRefiner {
   using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
 
   std::size_t middle_seeds() const noexcept { return static_cast<std::size_t>(settings_.refinement_seeds); }
-  /// Of runs to each side of a number. Places and times have many numbers, each of which is off by a lot there.
+  /// Of runs to each side of a number. Where many numbers move, each of them is off by a lot there.
   std::size_t slope_seeds(const EffectPoint& point) const noexcept {
-    return point.size() <= 2 ? middle_seeds() : (middle_seeds() + 1) / 2;
+    return point.moving() <= 3 ? middle_seeds() : (middle_seeds() + 1) / 2;
   }
 
   /// An effect on its way to where it explains most.
