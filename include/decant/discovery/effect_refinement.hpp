@@ -184,15 +184,14 @@ struct RefinementView {
   Eigen::VectorXd chaos{};           ///< by number: how large a slope is by chaos alone, as a distance; none if empty
 };
 
-/// Whether what a number changes stands out from what chaos makes of slopes, in all recordings together.
-inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number) {
-  constexpr double enough = 2;
+/// Whether what a number changes is more than so many times what chaos makes of slopes, in all recordings together.
+inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number, double enough = 2) {
   double energy = 0, chaos = 0;
   for (const RefinementView& view : views) {
     energy += view.space->distance(view.space->standardised_difference(view.slope.col(number)));
     chaos += view.chaos.size() > 0 ? view.chaos[number] : 0;
   }
-  return energy >= enough * chaos;
+  return energy > enough * chaos;
 }
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings

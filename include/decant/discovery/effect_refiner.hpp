@@ -406,23 +406,16 @@ class EffectRefiner {
   /// a jet that is moved by more than its width says nothing of which way to go.
   /// @return whether any was halved.
   static bool set_steps(const Candidate& candidate, EffectPoint& next) {
-    constexpr double enough = 4;
+    constexpr double enough = 4 * 4 + 1;  // of a whole step, which chaos is part of
     bool is_finer = false;
     for (Eigen::Index k = 0; k < next.size(); ++k) {
+      const double moved = std::abs(next.value()[k] - candidate.point.value()[k]);
       if (!next.is_place_or_time(k) || next.is_held(k)) {
         continue;
       }
       if (!tells(candidate.views, k)) {
         next.hold(k);
-        continue;
-      }
-      double energy = 0, chaos = 0;  // of half a step, per unit of the number
-      for (const RefinementView& view : candidate.views) {
-        energy += 0.25 * (view.space->distance(view.space->standardised_difference(view.slope.col(k))) - view.chaos[k]);
-        chaos += view.chaos[k];
-      }
-      const double moved = std::abs(next.value()[k] - candidate.point.value()[k]);
-      if (moved < 0.5 * candidate.point.step(k) && energy > enough * chaos) {
+      } else if (moved < 0.5 * candidate.point.step(k) && tells(candidate.views, k, enough)) {
         next.refine(k);
         is_finer = true;
       }
