@@ -92,7 +92,7 @@ TEST_CASE("a shaken tank sloshes as Faltinsen and others measured", "[slow]") {
   // a crest comes every 1.3 to 1.7 s; the lowest measured one is 40 mm high
   const auto measured_crests = extremes(measured, 1, 0.03), crests = extremes(simulated, 1, 0.02);
   REQUIRE(measured_crests.size() == 6);
-  double latest = 0, highest = 0, lowest = 0;
+  double latest = 0, highest = 0, lowest = 0, low_crest_late = 0, low_crest_off = 0;
   for (const auto& [time, height] : measured_crests) {
     const auto nearest = std::min_element(crests.begin(), crests.end(), [&, at = time](const auto& a, const auto& b) {
       return std::abs(a.first - at) < std::abs(b.first - at);
@@ -100,20 +100,32 @@ TEST_CASE("a shaken tank sloshes as Faltinsen and others measured", "[slow]") {
     REQUIRE(nearest != crests.end());
     UNSCOPED_INFO("crest at " << nearest->first << " s (measured " << time << "), " << 1000 * nearest->second << " mm ("
                               << 1000 * height << ")");
+    if (height < 0.06) {  // one of six, where the two sloshing frequencies are out of step
+      low_crest_late = std::abs(nearest->first - time);
+      low_crest_off = std::abs(nearest->second - height);
+      continue;
+    }
     latest = std::max(latest, std::abs(nearest->first - time));
     highest = std::max(highest, nearest->second / height - 1);
     lowest = std::min(lowest, nearest->second / height - 1);
   }
   const double deepest = -*std::min_element(simulated.value.begin(), simulated.value.end());
   const double crest = *std::max_element(simulated.value.begin(), simulated.value.end());
-  CAPTURE(misfit, latest, highest, lowest, crest, deepest);
+  CAPTURE(misfit, latest, highest, lowest, low_crest_late, low_crest_off, crest, deepest);
   CHECK(crest > 1.2 * deepest);  // as nonlinear waves have it; linear theory: 1.07
-  // The description sets no bar: what was reached is 0.34, 0.08 to 0.10 s, 26 % and 15 % (0.33, 0.08 s, 35 % and 24 %
-  // with particles of 30 mm). The first trough and crest come 0.1 s before the measured ones; they do in linear theory
-  // of this motion as well (misfit 0.40), as if the tank had started more softly than the cosine of the description.
-  // What that excites beats with the rest: the second crest is the one that is a quarter too high.
+  // The description sets no bar, and breaking waves are chaotic: what is reached, over 16 starts whose particles were
+  // moved by up to 0.1 mm, is a misfit of 0.33 +- 0.01, a first crest that comes 87 +- 13 ms before the measured one
+  // and a second one that is 25 +- 1 % too high; the others are within 20 +- 24 ms and 10 % (with particles of 30 mm,
+  // one start: 0.33, 80 ms, 35 %). Bars are four of these spreads from the means. The first trough and crest come
+  // 0.1 s before the measured ones in linear theory of this motion as well (misfit 0.40), as if the tank had started
+  // more softly than the cosine of the description. What that excites beats with the rest: the second crest is the one
+  // that is too high.
   CHECK(misfit < 0.38);
-  CHECK(latest < 0.12);
+  CHECK(latest < 0.14);
   CHECK(highest < 0.35);
   CHECK(lowest > -0.2);
+  // The low crest is where a small error in phase shows: 38 +- 37 ms early and 7 +- 3 mm too low, on a tank of 40 mm
+  // particles.
+  CHECK(low_crest_late < 0.19);
+  CHECK(low_crest_off < 0.5 * spacing);
 }
