@@ -155,6 +155,7 @@ struct EffectScore {
            : name == "wall_friction" ? layers * strength
            : name == "wall_adhesion" ? layers * layers * strength
            : name == "inlet_flow"    ? 1 - strength
+           : name == "back_pressure" ? 0.5 * strength  // the mean of beats that are as strong at most
            : name == "obstacle"      ? (truth.at("unit") == "mm" ? 1e-3 : 1.0) * strength
                                      : strength;
   }

@@ -94,6 +94,12 @@ inline std::string effect_words(const Effects& effects, const decant::RefinedEff
   std::string text = effect.words() + " " + components_text(found.strength);
   text += effect.unit.empty() ? "" : " ";
   text += effect.unit;
+  if (found.window && !effect.beats.empty()) {
+    text += " in beats of ";
+    text += decant::detail::fixed_text(found.window->until - found.window->from, 2);
+    text += " s";
+    return text;
+  }
   if (found.window && std::isfinite(found.window->from)) {
     text += " from ";
     text += decant::detail::fixed_text(found.window->from, 2);
@@ -122,7 +128,8 @@ inline std::string effect_code(const Effects& effects, const decant::RefinedEffe
           found.place.value_or(effect.place.value_or(decant::Vector3<double>::Zero()));
       code += components_text(place);
     } else if (c == '~') {
-      code += three_digits(begun ? window.until : window.from);
+      const double end = begun ? window.until : window.from;
+      code += std::isfinite(end) ? three_digits(end) : end < 0 ? "-INFINITY" : "INFINITY";
       begun = true;
     } else {
       code += c;

@@ -316,7 +316,8 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(
-            {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, names[k]));
+            {id, inside->mouth(), inside->up, 2 * inside->rim_radius(), inside->rim_radius() + 0.002}, names[k],
+            begin + 0.5 * seconds));
       }
     } else {
       effects.push_back(loss_effect<EffectModel>(id, inside->middle,

@@ -128,6 +128,22 @@ TEST_CASE("effect point: strengths, places and times of several effects are one 
   CHECK_FALSE(finer.is_place_or_time(7));
 }
 
+TEST_CASE("effect point: a beat is looked for around the one to begin with, and what is steady has none") {
+  Effect air = named("air", {{"", 0, 0, 8}});
+  air.window = TimeWindow{};
+  air.window_tolerance = 0.08;
+  EffectPoint steady, beating;
+  steady.add(air, 2, {2, numbers({4})});
+  CHECK(steady.size() == 1);
+  CHECK_FALSE(steady.applied(0).window);
+  beating.add(air, 2, {2, numbers({4}), {}, TimeWindow{1.2, 1.45}});
+  CHECK(beating.value() == numbers({4, 1.2, 1.45}));
+  CHECK(beating.range(1).first == Approx(1.12));
+  CHECK(beating.range(2).second == Approx(1.53));
+  CHECK(beating.step(1) == Approx(0.032));
+  CHECK(beating.with(1, 1.3).applied(0).window->from == Approx(1.28));
+}
+
 TEST_CASE("effect point: what is not looked for is no number of it") {
   Effect leak = named("leak", {{"", 0, 0, 40}});
   leak.place = Vector3<double>(0, 0, 0);  // without a tolerance

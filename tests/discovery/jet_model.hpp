@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <string>
@@ -29,6 +30,7 @@ struct Jet {
   int fatter = 0;                                  ///< of what is drawn [px]
   double tap = 0, tap_x = 0, tap_y = 0;            ///< more balls, that drop from there: how many a second; [m]
   double gust_from = 0.4, gust_until = 0.6;        ///< [s]
+  double beat_from = 0, beat_until = 0;            ///< one of the pull's, if it has any [s]
 };
 
 /// @param seed of where each ball leaves the nozzle, and how fast. @param angle of the nozzle [rad].
@@ -57,9 +59,11 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
     const double time = frame / 15.0;
     for (; now < time - 1e-9; now += step) {
       const double gust = now > jet.gust_from && now < jet.gust_until ? jet.gust : 0;
+      const double period = jet.beat_until - jet.beat_from;
+      const double beat = period > 0 ? 1 - std::cos(2 * std::numbers::pi * (now - jet.beat_from) / period) : 1;
       for (Ball& ball : balls) {
         if (now >= ball.born) {
-          ball.u += step * (jet.pull + gust - jet.drag * ball.u);
+          ball.u += step * (beat * jet.pull + gust - jet.drag * ball.u);
           ball.v += step * (-9.81 - jet.drag * ball.v);
           ball.x += step * ball.u;
           ball.y += step * ball.v;

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -195,6 +196,38 @@ class PullModel {
   std::vector<Effect> effects_{};
 };
 static_assert(ForwardModel<PullModel>);
+
+/// Knows of a pull that is steady or comes in beats, of drag, and of a nozzle that is faster than assumed.
+class BeatModel {
+ public:
+  BeatModel() {
+    effects_.erase(effects_.begin() + 3, effects_.end());
+    effects_[pull].window = TimeWindow{};
+    effects_[pull].window_tolerance = 0.1;
+    for (const double period : {0.3, 0.36, 0.43, 0.52}) {
+      for (int quarter = 0; quarter < 4; ++quarter) {
+        const double from = 0.4 + 0.25 * quarter * period;
+        effects_[pull].beats.push_back({from, from + period});
+      }
+    }
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    if (run.effects.empty() || run.effects[0].effect != pull || !run.effects[0].window) {
+      return jet_.predict(run);
+    }
+    Jet jet;
+    jet.pull = run.effects[0].strength[0];
+    jet.beat_from = run.effects[0].window->from;
+    jet.beat_until = run.effects[0].window->until;
+    return film_of(jet, run.seed);
+  }
+
+ private:
+  static constexpr std::size_t pull = 1;
+  JetModel jet_{0.9};
+  std::vector<Effect> effects_{jet_.effects()};
+};
 
 }  // namespace
 
@@ -475,6 +508,56 @@ TEST_CASE(
     CHECK(pull.strength[0] == Approx(1.2).epsilon(0.2));
     CHECK(found.verdict == Verdict::Named);
   }
+}
+
+TEST_CASE("missing effect: slopes that promise too much do not lead away from a time that tells where it is strong") {
+  // from the usual time on, a weaker pull that lasts longer does nearly as much: that way no end of it tells any more
+  const PullModel model;
+  ThreadExecutor executor{{1}};
+  for (const auto& [strength, until, seed] :
+       {std::tuple{-1.5, 0.76, 907U}, std::tuple{-1.35, 0.86, 911U}, std::tuple{-1.65, 0.86, 923U}}) {
+    Jet hidden;
+    hidden.gust = strength;
+    hidden.gust_from = 0.36;
+    hidden.gust_until = until;
+    const MissingEffect found =
+        MissingEffectSearch<PullModel>({{"a", &model, film_of(hidden, seed)}}, {}, run_jobs_on(executor)).find();
+    REQUIRE(!found.refined.empty());
+    const RefinedEffect& pull = found.refined.front();
+    INFO("seed " << seed << ", left " << pull.distance << " of " << found.learn.before);
+    REQUIRE(pull.window);
+    CHECK(pull.window->from == Approx(0.36).margin(0.07));  // frames are as far apart
+    CHECK(pull.window->until == Approx(until).margin(0.1));
+    CHECK(pull.strength[0] == Approx(strength).epsilon(0.2));
+    CHECK(pull.distance < 1.5 * found.learn.noise);
+  }
+}
+
+TEST_CASE("missing effect: what comes in beats is told from what lasts, with its beat") {
+  const BeatModel model;
+  ThreadExecutor executor{{1}};
+  const auto nearest = [&](double period, std::uint32_t seed) {
+    Jet hidden;
+    hidden.pull = 1.2;
+    hidden.beat_from = period > 0 ? 0.55 : 0;
+    hidden.beat_until = hidden.beat_from + period;
+    const MissingEffect found =
+        MissingEffectSearch<BeatModel>({{"a", &model, film_of(hidden, seed)}}, {}, run_jobs_on(executor)).find();
+    REQUIRE(!found.refined.empty());
+    CHECK(found.verdict == Verdict::Named);
+    CHECK(model.effects()[found.refined.front().effect].name == "pull");
+    CHECK(found.refined.front().strength[0] == Approx(1.2).epsilon(0.15));
+    return found.refined.front();
+  };
+  for (const double period : {0.33, 0.48}) {  // none of those that are tried
+    const RefinedEffect pull = nearest(period, 81);
+    REQUIRE(pull.window);
+    CAPTURE(pull.window->from, pull.window->until, pull.distance);
+    CHECK(pull.window->until - pull.window->from == Approx(period).margin(0.03));
+    const double beats = (pull.window->from - 0.55) / period;
+    CHECK(std::abs(beats - std::round(beats)) < 0.12);
+  }
+  CHECK_FALSE(nearest(0, 82).window);
 }
 
 TEST_CASE("missing effect: the best one goes on for as long as a step gains") {

@@ -403,7 +403,7 @@ TEST_CASE("simulated interaction: a pipe that is blocked in part lets less pass,
 TEST_CASE("simulated interaction: obstacles go with their body, and necks hold liquid back") {
   auto effects = pour_catalogue();
   effects.push_back(obstacle_effect<PourModel>(0, {0.01, 0, 0.06}, "mouth"));
-  effects.push_back(back_pressure_effect<PourModel>({0, {0, 0, 0.07}, {0, 0, 1}, 0.07, 0.04}, "cup"));
+  effects.push_back(back_pressure_effect<PourModel>({0, {0, 0, 0.07}, {0, 0, 1}, 0.07, 0.04}, "cup", 0.2));
   SimulatedInteractionSettings settings;
   settings.spacing = 0.009;
   const Pour pour(pour_scene(), effects, settings);

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <decant/force/back_pressure.hpp>
 
+#include <limits>
 #include <numbers>
 #include <tuple>
+#include <vector>
 
 #include <decant/force/concept.hpp>
 #include <decant/kernel/cubic_spline.hpp>
@@ -62,6 +64,32 @@ TEST_CASE("back-pressure: what runs out is slowed evenly until it rests, and is 
   CHECK(slower.x() == 0.1);  // across the neck nothing holds it
   const Vector3<double> at_rest = velocity_after(in_neck(inside, out, 2), 0.6);
   CHECK(at_rest.z() == Approx(0).margin(1e-12));
+}
+
+TEST_CASE(
+    "back-pressure: in beats it is none when a bubble comes in, twice as much between two, and the same in the mean") {
+  const Vector3<double> inside(0, 0, -0.5), out(0, 0, 0.6);
+  auto beating = in_neck(inside, out, 2);
+  beating.force<decant::BackPressure<double>>().beat = {0.02, 0.12};  // as well as -0.08 to 0.02, and so on
+  double before = 0.6;
+  std::vector<double> lost;
+  for (int k = 0; k < 100; ++k) {
+    REQUIRE(beating.step(0.001).advanced());
+    const double now = beating.fluid().velocity(2, 0);
+    lost.push_back((before - now) / 0.001);
+    before = now;
+  }
+  CHECK(before == Approx(0.4).epsilon(1e-9));  // as without beats
+  CHECK(lost[20] == Approx(0).margin(0.01));
+  CHECK(lost[70] == Approx(4).margin(0.01));
+  CHECK(lost[45] == Approx(2).margin(0.07));
+  // what has no end, or ends before it begins, is no beat
+  decant::BackPressure<double>::Beat none;
+  CHECK(none.share(0.3) == 1);
+  none.until = std::numeric_limits<double>::infinity();
+  CHECK(none.share(0.3) == 1);
+  none = {2, 1};
+  CHECK(none.share(0.3) == 1);
 }
 
 TEST_CASE("back-pressure: what runs in, or is not in the neck, is let go") {

@@ -65,6 +65,9 @@ struct Effect {
   SeenFirst seen_first = SeenFirst::Nothing;  ///< where recordings begin to disagree with a model it may be, if so
   std::optional<TimeWindow> window{};         ///< when it acts, if it does not all the time
   double window_tolerance = 0;  ///< how much earlier or later finite ends of it may be [s]; 0: no others are tried
+  /// Of what comes again and again: beats that are tried when it is looked at closely, the best one further, since no
+  /// step leads there from another one. Its window is one beat then, and without ends the mean over many.
+  std::vector<TimeWindow> beats{};
   std::string code{};  ///< C++ that adds it to a simulator: @ stands for the strength, one after another of its
                        ///< components, # for the place, and ~ for the window's ends, one after another; empty where
                        ///< there is none
@@ -108,6 +111,10 @@ inline void validate(const Effect& effect) {
           effect.window_tolerance);
   expects(!effect.window || effect.window->from < effect.window->until, of + "window", "its beginning before its end",
           effect.window ? effect.window->from : 0);
+  for (const TimeWindow& beat : effect.beats) {
+    expects(effect.window && beat.from < beat.until, of + "beats",
+            "a window to stand for, their beginning before their end", beat.from);
+  }
   for (const EffectComponent& each : effect.components) {
     expects(std::isfinite(each.low) && std::isfinite(each.high) && each.low <= each.base && each.base <= each.high &&
                 each.low < each.high,

@@ -25,7 +25,8 @@
 namespace decant::inline DECANT_TARGET {
 
 /// A guess of strengths, places and times of one or more effects as one vector: of each effect its components, then its
-/// place's three coordinates [m] and its window's finite ends [s], if it has any that are looked for.
+/// place's three coordinates [m] and its window's finite ends [s], if it has any that are looked for. Places and times
+/// are looked for around the effect's own ones; around the guess's where the effect has no time, but beats.
 class EffectPoint {
  public:
   /// Takes one more effect. @param effect has to outlive the point. @param number of it among the model's effects.
@@ -42,6 +43,8 @@ class EffectPoint {
     part.least_step = least_step.size() > 0 ? least_step : Eigen::VectorXd::Zero(components);
     const Vector3<double> place = guess.place.value_or(effect.place.value_or(Vector3<double>::Zero()));
     const TimeWindow window = guess.window.value_or(effect.window.value_or(TimeWindow{}));
+    const bool is_usual = effect.window && (std::isfinite(effect.window->from) || std::isfinite(effect.window->until));
+    part.window = is_usual ? *effect.window : window;
     part.coordinates = effect.place && effect.place_tolerance > 0 ? 3 : 0;
     const bool timed = effect.window && effect.window_tolerance > 0;
     part.begins = timed && std::isfinite(window.from) ? 1 : 0;
@@ -101,7 +104,7 @@ class EffectPoint {
     const Part& of = part_of(k);
     if (k >= of.time()) {
       const bool end = of.begins == 0 || k > of.time();
-      const double middle = end ? of.effect->window->until : of.effect->window->from;
+      const double middle = end ? of.window.until : of.window.from;
       return {middle - of.effect->window_tolerance, middle + of.effect->window_tolerance};
     }
     if (k >= of.place()) {
@@ -156,6 +159,7 @@ class EffectPoint {
     std::size_t number;
     Eigen::Index begin, components, coordinates = 0, begins = 0, ends = 0;  ///< how many numbers it has of each
     Eigen::VectorXd least_step{};
+    TimeWindow window{};  ///< about when
 
     Eigen::Index size() const noexcept { return components + coordinates + begins + ends; }
     Eigen::Index place() const noexcept { return begin + components; }

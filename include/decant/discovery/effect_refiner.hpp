@@ -55,6 +55,7 @@ class EffectRefiner {
   std::vector<RefinedTogether> best(const Judgement& judgement, const ComparedRecordings& known,
                                     const std::vector<RefinedEffect>& found, double before) {
     std::vector<Candidate> candidates = chosen(judgement, known, found);
+    add_beats(candidates, known, found);
     const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
     for (int round = 0; round < most && !candidates.empty(); ++round) {
       if (round >= settings_.refinement_rounds) {
@@ -71,7 +72,7 @@ class EffectRefiner {
       points.push_back(each.point);
     }
     const bool faint = before <= known.chance.largest_distance;  // few runs would tell more of chaos than of it
-    const std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
+    std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
     std::vector<Evidence> evidence;
     double least = std::numeric_limits<double>::infinity();
     std::size_t best = 0;
@@ -80,6 +81,17 @@ class EffectRefiner {
       evidence.back().value -= static_cast<double>(points[k].size());
       least = std::min(least, left[k].value);
       best = evidence[k].value > evidence[best].value ? k : best;
+    }
+    // nobody has checked the last step; where it led away, the point before it is taken
+    if (!points.empty() && relative_fall(left[best].value, candidates[best].nearest.distance) > known.chance.fall) {
+      const DistanceLeft there = distances({candidates[best].nearest.point}, known, faint ? 3 : 1).front();
+      if (relative_fall(left[best].value, there.value) > known.chance.fall) {
+        points[best] = candidates[best].nearest.point;
+        left[best] = there;
+        evidence[best] = evidence_of(there.value, there.deviation, known.chance);
+        evidence[best].value -= static_cast<double>(points[best].size());
+        least = std::min(least, there.value);
+      }
     }
     std::vector<RefinedTogether> refined;
     for (std::size_t k = 0; k < points.size(); ++k) {
@@ -119,6 +131,13 @@ class EffectRefiner {
     return point.moving() <= 3 ? middle_seeds() : (middle_seeds() + 1) / 2;
   }
 
+  /// Where runs were nearest to what was recorded, of all points that a candidate has been at.
+  struct NearestPoint {
+    EffectPoint point{};
+    Views views{};
+    double distance = std::numeric_limits<double>::infinity();
+  };
+
   /// An effect on its way to where it explains most.
   struct Candidate {
     std::size_t judged = 0;  ///< its number in the Judgement
@@ -126,6 +145,7 @@ class EffectRefiner {
     Views views{};         ///< of the last step
     double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
     bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
+    NearestPoint nearest{};
   };
 
   /// A run with an effect, and what is left with it.
@@ -159,19 +179,19 @@ class EffectRefiner {
 
   /// By component, half of how far strengths have to be apart to differ by four times as much as two runs' mean does by
   /// chaos; of what is too faint for that, half of all strengths.
-  static Eigen::VectorXd telling_steps(const EffectStanding& standing, const ComparedRecordings& known) {
+  static Eigen::VectorXd telling_steps(std::size_t judged, const Eigen::VectorXd& at, const ComparedRecordings& known) {
     constexpr double enough = 4;
-    const Effect& effect = known.effects[standing.effect];
+    const Effect& effect = known.effects[judged];
     std::vector<EffectCurve> curves;
     double chaos = 0;
     for (const RecordedEvidence& each : known.recorded) {
-      curves.push_back(*each.curve(standing.effect));
+      curves.push_back(*each.curve(judged));
       chaos += each.chaos();
     }
-    Eigen::VectorXd steps(standing.strength.size());
+    Eigen::VectorXd steps(at.size());
     for (Eigen::Index k = 0; k < steps.size(); ++k) {
       const EffectComponent& of = effect.components[static_cast<std::size_t>(k)];
-      const double end = standing.strength[k] < of.base || of.high == of.base ? of.low : of.high;
+      const double end = at[k] < of.base || of.high == of.base ? of.low : of.high;
       const auto tells = [&](double share) {
         Eigen::VectorXd strength = effect.base();
         strength[k] = of.base + share * (end - of.base);
@@ -188,6 +208,19 @@ class EffectRefiner {
       steps[k] = 0.5 * share * std::abs(end - of.base);
     }
     return steps;
+  }
+
+  /// One of the judged effects beside those that were found before. @param guess to begin with.
+  Candidate candidate(std::size_t judged, const AppliedEffect& guess, const ComparedRecordings& known,
+                      const std::vector<RefinedEffect>& found) const {
+    Candidate result;
+    result.judged = judged;
+    for (const RefinedEffect& each : found) {
+      result.point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
+    }
+    result.point.add(known.effects[judged], guess.effect, guess, telling_steps(judged, guess.strength, known));
+    result.point = result.point.rounded();
+    return result;
   }
 
   /// Whether one answer has several such effects: in different places, or for a while at different times. By a curve
@@ -214,16 +247,10 @@ class EffectRefiner {
       if (std::any_of(found.begin(), found.end(), [&](const auto& other) { return other.effect == number; })) {
         continue;
       }
-      Candidate candidate;
-      candidate.judged = standing.effect;
-      for (const RefinedEffect& each : found) {
-        candidate.point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
-      }
-      candidate.point.add(effect, number, {number, standing.strength, {}}, telling_steps(standing, known));
-      candidate.point = candidate.point.rounded();
+      Candidate one = candidate(standing.effect, {number, standing.strength, {}}, known, found);
       const double evidence =
-          evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(candidate.point.size());
-      of_answer[effect.answer()].push_back({std::move(candidate), standing.distance, evidence});
+          evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(one.point.size());
+      of_answer[effect.answer()].push_back({std::move(one), standing.distance, evidence});
       if (standing.improvement > 0) {
         order.push_back(effect.answer());
       }
@@ -268,6 +295,32 @@ class EffectRefiner {
       }
     }
     return result;
+  }
+
+  /// Beside each candidate of which there are beats to try the one whose run is nearest to what was recorded.
+  void add_beats(std::vector<Candidate>& candidates, const ComparedRecordings& known,
+                 const std::vector<RefinedEffect>& found) {
+    const std::size_t given = candidates.size();
+    for (std::size_t which = 0; which < given; ++which) {
+      const std::size_t judged = candidates[which].judged;
+      const Effect& effect = known.effects[judged];
+      std::vector<Candidate> others;
+      std::vector<Run> runs;
+      for (const TimeWindow& beat : effect.beats) {
+        AppliedEffect in_beats = candidates[which].point.applied(found.size());
+        in_beats.window = beat;
+        others.push_back(candidate(judged, in_beats, known, found));
+        for (const Interaction<Model>& of : *of_) {
+          runs.emplace_back(&of, others.back().point.run(4001 + static_cast<std::uint32_t>(runs.size())));
+        }
+      }
+      const std::vector<DistanceLeft> left = distances_left(*runs_, runs, 1, known.recorded);
+      const auto nearest =
+          std::min_element(left.begin(), left.end(), [](const auto& a, const auto& b) { return a.value < b.value; });
+      if (nearest != left.end() && std::isfinite(nearest->value)) {
+        candidates.push_back(std::move(others[static_cast<std::size_t>(nearest - left.begin())]));
+      }
+    }
   }
 
   /// Whether an effect that leaves so much may yet be the best one.
@@ -363,6 +416,13 @@ class EffectRefiner {
     using Features = Eigen::VectorXd;
     const double before =
         mean_distance([](const View& view, const Features& own) -> Features { return own - view.middle; });
+    if (led_away(candidate, before, known.chance)) {
+      go_half_way_back(candidate);
+      return;
+    }
+    if (before < candidate.nearest.distance) {
+      candidate.nearest = {candidate.point, candidate.views, before};
+    }
     candidate.expected = mean_distance(
         [&](const View& view, const Features& own) -> Features { return own - view.middle - view.slope * move; });
     for (const View& view : candidate.views) {  // what slopes have of chaos
@@ -401,21 +461,59 @@ class EffectRefiner {
     candidate.point = next.rounded();
   }
 
-  /// Of places and times. What changes no more than chaos does is held: one camera may not tell how far off something
-  /// is. A step of what hardly moves any more is halved, as long as half of it tells four times as much as chaos does:
-  /// a jet that is moved by more than its width says nothing of which way to go.
+  /// Whether the last step came to less than a quarter of what its slopes promised, or to a loss, and by more than what
+  /// chance makes of distances. @param distance where it led to.
+  static bool led_away(const Candidate& candidate, double distance, const ChanceLevel& chance) {
+    const double nearest = candidate.nearest.distance;
+    if (!std::isfinite(nearest) || distance <= chance.largest_distance) {
+      return false;
+    }
+    const double promised = nearest - candidate.expected, gain = nearest - distance;
+    const double by_chance = chance.fall * nearest;
+    return gain < -by_chance || (promised > by_chance && gain < 0.25 * promised);
+  }
+
+  /// Where what an effect does is bent, as that of a strength and the time for which it lasts is, which act by their
+  /// product, slopes may promise too much (a line search: Nocedal and Wright, Numerical Optimization, 2006, chapter 3).
+  static void go_half_way_back(Candidate& candidate) {
+    const NearestPoint& nearest = candidate.nearest;
+    EffectPoint half_way = candidate.point;
+    bool is_near = true;
+    for (Eigen::Index k = 0; k < half_way.size(); ++k) {
+      const double off = 0.5 * (half_way.value()[k] - nearest.point.value()[k]);
+      half_way = half_way.with(k, nearest.point.value()[k] + off);
+      is_near = is_near && std::abs(off) <= 0.1 * half_way.step(k);
+    }
+    candidate.point = is_near ? nearest.point : half_way.rounded();
+    candidate.views = nearest.views;
+    // of a parabola whose end the step was to be
+    candidate.expected = is_near ? nearest.distance : nearest.distance - 0.75 * (nearest.distance - candidate.expected);
+    candidate.settled = is_near;
+  }
+
+  /// Of places and times. What changes no more than chaos does is held, unless strengths are still on their way, since
+  /// a weak effect's time does not tell: one camera may not tell how far off something is. A step of what hardly moves
+  /// any more is halved, as long as half of it tells four times as much as chaos does: a jet that is moved by more than
+  /// its width says nothing of which way to go.
   /// @return whether any was halved.
   static bool set_steps(const Candidate& candidate, EffectPoint& next) {
-    constexpr double enough = 4 * 4 + 1;  // of a whole step, which chaos is part of
-    bool is_finer = false;
+    constexpr double halvable = 4 * 4 + 1;  // of a whole step, which chaos is part of
+    const auto moves = [&](Eigen::Index k) {
+      return std::abs(next.value()[k] - candidate.point.value()[k]) >= 0.5 * candidate.point.step(k);
+    };
+    bool strength_moves = false, is_finer = false;
     for (Eigen::Index k = 0; k < next.size(); ++k) {
-      const double moved = std::abs(next.value()[k] - candidate.point.value()[k]);
+      strength_moves = strength_moves || (!next.is_place_or_time(k) && moves(k));
+    }
+    for (Eigen::Index k = 0; k < next.size(); ++k) {
       if (!next.is_place_or_time(k) || next.is_held(k)) {
         continue;
       }
       if (!tells(candidate.views, k)) {
-        next.hold(k);
-      } else if (moved < 0.5 * candidate.point.step(k) && tells(candidate.views, k, enough)) {
+        if (!strength_moves) {
+          next.hold(k);
+        }
+      } else if (!moves(k) && tells(candidate.views, k, halvable)) {
         next.refine(k);
         is_finer = true;
       }

@@ -401,29 +401,49 @@ struct Neck {
   double length = 0, radius = 0;                    ///< [m]
 };
 
-/// Air that comes into a container only past the liquid that runs out. @param where in words.
+/// Beats to try, for Effect::beats: of six periods, a fifth apart, each at four phases. @param shortest, first [s]:
+/// about when they are counted from.
+inline std::vector<TimeWindow> beats_to_try(double shortest, double first) {
+  std::vector<TimeWindow> beats;
+  double period = shortest;
+  for (int k = 0; k < 6; ++k, period *= 1.2) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      const double from = first + 0.25 * quarter * period;
+      beats.push_back({from, from + period});
+    }
+  }
+  return beats;
+}
+
+/// Air that comes into a container only past the liquid that runs out. @param where in words. @param middle of the time
+/// in which it does [s], which beats are counted from: bubbles come in 2 to 5 times a second.
 template <class Model>
-InteractionEffect<Model> back_pressure_effect(const Neck& neck, std::string where) {
+InteractionEffect<Model> back_pressure_effect(const Neck& neck, std::string where, double middle) {
   using Scalar = typename Model::Scalar;
   Effect effect =
       plain_effect("back_pressure", "", "m/s^2",
                    "air cannot get in as fast as liquid wants to get out (a bottle that glugs)", {"", 0, 0, 8},
                    "auto& air = simulator.force<BackPressure<float>>(); air.strength = @; air.mouth "
-                   "= {#}; air.container = motion_of_container;");
+                   "= {#}; air.container = motion_of_container; air.beat = {~, ~};");
   effect.place = neck.mouth;
+  effect.window = TimeWindow{};
+  effect.window_tolerance = 0.08;
+  effect.beats = beats_to_try(0.2, middle);
   effect.where = std::move(where);
-  return detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
-                                   [neck](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-                                     changes.of_model.push_back([neck, strength = as.strength[0]](Model& model) {
-                                       BackPressure<Scalar>& air = model.template force<BackPressure<Scalar>>();
-                                       air.strength = static_cast<Scalar>(strength);
-                                       air.mouth = neck.mouth;
-                                       air.axis = neck.axis;
-                                       air.reach = neck.length;
-                                       air.radius = neck.radius;
-                                       air.container = model.bodies()[neck.body].motion;
-                                     });
-                                   });
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Physics, [neck](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+        changes.of_model.push_back([neck, as, first = changes.first](Model& model) {
+          BackPressure<Scalar>& air = model.template force<BackPressure<Scalar>>();
+          air.strength = static_cast<Scalar>(as.strength[0]);
+          const TimeWindow beat = in_model_time(as.window.value_or(TimeWindow{}), model, first);
+          air.beat = {beat.from, beat.until};
+          air.mouth = neck.mouth;
+          air.axis = neck.axis;
+          air.reach = neck.length;
+          air.radius = neck.radius;
+          air.container = model.bodies()[neck.body].motion;
+        });
+      });
 }
 
 /// How much there is at first, over what the model assumes.
