@@ -186,6 +186,7 @@ struct RefinementView {
   Eigen::MatrixXd slope{};           ///< p x size of the point: what a change of one unit does
   Eigen::MatrixXd below{}, above{};  ///< p x size of the point: one step off in each of its numbers
   Eigen::VectorXd chaos{};           ///< by number: how large a slope is by chaos alone, as a distance; none if empty
+  double side_chaos = 0;             ///< how much farther off than the middle those below and above are by chaos alone
 };
 
 /// Whether what a number changes is more than so many times what chaos makes of slopes, in all recordings together.

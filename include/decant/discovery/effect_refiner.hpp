@@ -29,6 +29,7 @@
 #include <decant/discovery/missing_effect_result.hpp>
 #include <decant/discovery/missing_effect_settings.hpp>
 #include <decant/discovery/observation.hpp>
+#include <decant/discovery/refinement_path.hpp>
 
 namespace decant::inline DECANT_TARGET {
 
@@ -69,7 +70,7 @@ class EffectRefiner {
     }
     std::vector<EffectPoint> points;
     for (const Candidate& each : candidates) {
-      points.push_back(each.point);
+      points.push_back(each.path.point());
     }
     const bool faint = before <= known.chance.largest_distance;  // few runs would tell more of chaos than of it
     std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
@@ -83,10 +84,11 @@ class EffectRefiner {
       best = evidence[k].value > evidence[best].value ? k : best;
     }
     // nobody has checked the last step; where it led away, the point before it is taken
-    if (!points.empty() && relative_fall(left[best].value, candidates[best].nearest.distance) > known.chance.fall) {
-      const DistanceLeft there = distances({candidates[best].nearest.point}, known, faint ? 3 : 1).front();
+    if (!points.empty() &&
+        relative_fall(left[best].value, candidates[best].path.least_distance()) > known.chance.fall) {
+      const DistanceLeft there = distances({candidates[best].path.nearest()}, known, faint ? 3 : 1).front();
       if (relative_fall(left[best].value, there.value) > known.chance.fall) {
-        points[best] = candidates[best].nearest.point;
+        points[best] = candidates[best].path.nearest();
         left[best] = there;
         evidence[best] = evidence_of(there.value, there.deviation, known.chance);
         evidence[best].value -= static_cast<double>(points[best].size());
@@ -105,7 +107,7 @@ class EffectRefiner {
       // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)
       const double more = std::sqrt(std::max(1.0, one.distance / std::max(known.chance.distance, 1e-12)));
       const Eigen::VectorXd deviation =
-          k == best ? Eigen::VectorXd(more * deviations(points[k], candidates[k].views, known))
+          k == best ? Eigen::VectorXd(more * deviations(points[k], candidates[k].path.views(), known))
                     : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);
@@ -123,7 +125,7 @@ class EffectRefiner {
 
  private:
   using Run = typename InteractionRuns<Model>::Run;
-  using Views = std::vector<RefinementView>;  ///< by recording; empty where a run failed
+  using Views = std::vector<RefinementView>;
 
   std::size_t middle_seeds() const noexcept { return static_cast<std::size_t>(settings_.refinement_seeds); }
   /// Of runs to each side of a number. Where many numbers move, each of them is off by a lot there.
@@ -131,21 +133,10 @@ class EffectRefiner {
     return point.moving() <= 3 ? middle_seeds() : (middle_seeds() + 1) / 2;
   }
 
-  /// Where runs were nearest to what was recorded, of all points that a candidate has been at.
-  struct NearestPoint {
-    EffectPoint point{};
-    Views views{};
-    double distance = std::numeric_limits<double>::infinity();
-  };
-
   /// An effect on its way to where it explains most.
   struct Candidate {
     std::size_t judged = 0;  ///< its number in the Judgement
-    EffectPoint point{};
-    Views views{};         ///< of the last step
-    double expected = 0;   ///< distance after it, by the linear model that it was made with; infinite where runs fail
-    bool settled = false;  ///< the last step was no gain that could be told from chance: there is no other one
-    NearestPoint nearest{};
+    RefinementPath path;
   };
 
   /// A run with an effect, and what is left with it.
@@ -213,14 +204,12 @@ class EffectRefiner {
   /// One of the judged effects beside those that were found before. @param guess to begin with.
   Candidate candidate(std::size_t judged, const AppliedEffect& guess, const ComparedRecordings& known,
                       const std::vector<RefinedEffect>& found) const {
-    Candidate result;
-    result.judged = judged;
+    EffectPoint point;
     for (const RefinedEffect& each : found) {
-      result.point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
+      point.add(of_->front().model->effects()[each.effect], each.effect, each.applied());
     }
-    result.point.add(known.effects[judged], guess.effect, guess, telling_steps(judged, guess.strength, known));
-    result.point = result.point.rounded();
-    return result;
+    point.add(known.effects[judged], guess.effect, guess, telling_steps(judged, guess.strength, known));
+    return {judged, RefinementPath(point.rounded())};
   }
 
   /// Whether one answer has several such effects: in different places, or for a while at different times. By a curve
@@ -249,7 +238,7 @@ class EffectRefiner {
       }
       Candidate one = candidate(standing.effect, {number, standing.strength, {}}, known, found);
       const double evidence =
-          evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(one.point.size());
+          evidence_of(standing.distance, 0, known.chance).value - static_cast<double>(one.path.point().size());
       of_answer[effect.answer()].push_back({std::move(one), standing.distance, evidence});
       if (standing.improvement > 0) {
         order.push_back(effect.answer());
@@ -287,11 +276,12 @@ class EffectRefiner {
       }
       const bool bent = with != nullptr && relative_fall(with->distance, run.distance) > known.chance.fall;
       if (bent && comes_near(run.distance, best, known.chance)) {
-        Candidate& candidate = result.emplace_back(with->candidate);
-        const auto [begin, count] = candidate.point.strength_of(found.size());
+        EffectPoint point = with->candidate.path.point();
+        const auto [begin, count] = point.strength_of(found.size());
         for (Eigen::Index k = 0; k < count; ++k) {
-          candidate.point = candidate.point.with(begin + k, run.strength[k]);
+          point = point.with(begin + k, run.strength[k]);
         }
+        result.push_back({with->candidate.judged, RefinementPath(std::move(point))});
       }
     }
     return result;
@@ -307,11 +297,11 @@ class EffectRefiner {
       std::vector<Candidate> others;
       std::vector<Run> runs;
       for (const TimeWindow& beat : effect.beats) {
-        AppliedEffect in_beats = candidates[which].point.applied(found.size());
+        AppliedEffect in_beats = candidates[which].path.point().applied(found.size());
         in_beats.window = beat;
         others.push_back(candidate(judged, in_beats, known, found));
         for (const Interaction<Model>& of : *of_) {
-          runs.emplace_back(&of, others.back().point.run(4001 + static_cast<std::uint32_t>(runs.size())));
+          runs.emplace_back(&of, others.back().path.point().run(4001 + static_cast<std::uint32_t>(runs.size())));
         }
       }
       const std::vector<DistanceLeft> left = distances_left(*runs_, runs, 1, known.recorded);
@@ -332,22 +322,25 @@ class EffectRefiner {
   static void keep_promising(std::vector<Candidate>& candidates, const ChanceLevel& chance) {
     std::vector<double> sorted;
     for (const Candidate& each : candidates) {
-      sorted.push_back(each.expected);
+      sorted.push_back(each.path.expected());
     }
     std::sort(sorted.begin(), sorted.end());
     const double rival = sorted[std::min<std::size_t>(1, sorted.size() - 1)];
     std::erase_if(candidates, [&](const Candidate& each) {
-      return each.expected > rival && !comes_near(each.expected, sorted.front(), chance);
+      return each.path.expected() > rival && !comes_near(each.path.expected(), sorted.front(), chance);
     });
   }
 
   /// Only the best one goes on. What is far from where it is looked for first takes more steps than others, and what it
   /// has not got to by then would be another effect's to explain.
   static void settle_others(std::vector<Candidate>& candidates) {
-    const auto best = std::min_element(candidates.begin(), candidates.end(),
-                                       [](const auto& a, const auto& b) { return a.expected < b.expected; });
+    const auto best = std::min_element(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+      return a.path.expected() < b.path.expected();
+    });
     for (auto each = candidates.begin(); each != candidates.end(); ++each) {
-      each->settled = each->settled || each != best;
+      if (each != best) {
+        each->path.settle();
+      }
     }
   }
 
@@ -360,10 +353,10 @@ class EffectRefiner {
       }
     };
     for (const Candidate& each : candidates) {
-      if (each.settled) {
+      if (each.path.is_settled()) {
         continue;
       }
-      const EffectPoint& point = each.point;
+      const EffectPoint& point = each.path.point();
       for (const Interaction<Model>& of : *of_) {
         ask(of, point, middle_seeds());
         for (Eigen::Index k = 0; k < point.size(); ++k) {
@@ -377,148 +370,25 @@ class EffectRefiner {
     const std::vector<Observation> seen = (*runs_)(runs);
     const Observation* next = seen.data();
     for (Candidate& each : candidates) {
-      if (each.settled) {
+      if (each.path.is_settled()) {
         continue;
       }
-      each.views.clear();
+      const EffectPoint& point = each.path.point();
+      Views views;
+      std::vector<Eigen::VectorXd> features;
       for (const RecordedEvidence& recorded : known.recorded) {
-        if (auto view = view_of(each.point, recorded, next)) {
-          each.views.push_back(std::move(*view));
+        if (auto view = view_of(point, recorded, next)) {
+          views.push_back(std::move(*view));
+          features.push_back(recorded.recorded_features());
         }
-        next += middle_seeds() + slope_seeds(each.point) * 2 * each.point.moving();
+        next += middle_seeds() + slope_seeds(point) * 2 * point.moving();
       }
-      if (each.views.size() < known.recorded.size()) {
-        each.views.clear();
-        each.expected = std::numeric_limits<double>::infinity();
-        each.settled = true;
+      if (views.size() < known.recorded.size()) {
+        each.path.fail();
       } else {
-        step(each, known);
+        each.path.step(std::move(views), features, known.chance);
       }
     }
-  }
-
-  /// By its views.
-  void step(Candidate& candidate, const ComparedRecordings& known) const {
-    std::vector<Eigen::VectorXd> recorded;
-    for (const RecordedEvidence& each : known.recorded) {
-      recorded.push_back(each.recorded_features());
-    }
-    const Eigen::VectorXd move = refinement(candidate.point, candidate.views, recorded);
-    const auto mean_distance = [&](const auto& off) {
-      double sum = 0;
-      for (std::size_t k = 0; k < candidate.views.size(); ++k) {
-        const NuisanceSpace& space = *candidate.views[k].space;
-        sum += space.distance(space.standardised_difference(off(candidate.views[k], recorded[k])));
-      }
-      return sum / static_cast<double>(candidate.views.size());
-    };
-    using View = RefinementView;
-    using Features = Eigen::VectorXd;
-    const double before =
-        mean_distance([](const View& view, const Features& own) -> Features { return own - view.middle; });
-    if (led_away(candidate, before, known.chance)) {
-      go_half_way_back(candidate);
-      return;
-    }
-    if (before < candidate.nearest.distance) {
-      candidate.nearest = {candidate.point, candidate.views, before};
-    }
-    candidate.expected = mean_distance(
-        [&](const View& view, const Features& own) -> Features { return own - view.middle - view.slope * move; });
-    for (const View& view : candidate.views) {  // what slopes have of chaos
-      candidate.expected -= view.chaos.dot(move.cwiseAbs2()) / static_cast<double>(candidate.views.size());
-    }
-    candidate.expected = std::max(candidate.expected, 0.0);
-    EffectPoint next = candidate.point;
-    for (Eigen::Index k = 0; k < next.size(); ++k) {
-      next = next.with(k, candidate.point.value()[k] + move[k]);
-    }
-    // where what an effect does is bent, a point that was tried may be nearer than what slopes promise; what fewer
-    // runs' mean is off by more through their chaos is taken off
-    double chaotic = 0;
-    for (const RecordedEvidence& each : known.recorded) {
-      chaotic += each.chaos() / static_cast<double>(known.recorded.size());
-    }
-    const double more =
-        chaotic / static_cast<double>(slope_seeds(candidate.point)) - chaotic / static_cast<double>(middle_seeds());
-    for (Eigen::Index number = 0; number < next.size(); ++number) {
-      if (candidate.point.is_held(number)) {
-        continue;
-      }
-      for (const int side : {-1, 1}) {
-        const double there = mean_distance([&](const View& view, const Features& own) -> Features {
-                               return own - (side < 0 ? view.below : view.above).col(number);
-                             }) -
-                             more;
-        if (there > 0 && relative_fall(candidate.expected, there) > known.chance.fall) {
-          candidate.expected = there;
-          next = candidate.point.with(number, candidate.point.value()[number] + side * candidate.point.step(number));
-        }
-      }
-    }
-    const bool is_finer = set_steps(candidate, next);
-    candidate.settled = !is_finer && relative_fall(before, candidate.expected) < 0.5 * known.chance.fall;
-    candidate.point = next.rounded();
-  }
-
-  /// Whether the last step came to less than a quarter of what its slopes promised, or to a loss, and by more than what
-  /// chance makes of distances. @param distance where it led to.
-  static bool led_away(const Candidate& candidate, double distance, const ChanceLevel& chance) {
-    const double nearest = candidate.nearest.distance;
-    if (!std::isfinite(nearest) || distance <= chance.largest_distance) {
-      return false;
-    }
-    const double promised = nearest - candidate.expected, gain = nearest - distance;
-    const double by_chance = chance.fall * nearest;
-    return gain < -by_chance || (promised > by_chance && gain < 0.25 * promised);
-  }
-
-  /// Where what an effect does is bent, as that of a strength and the time for which it lasts is, which act by their
-  /// product, slopes may promise too much (a line search: Nocedal and Wright, Numerical Optimization, 2006, chapter 3).
-  static void go_half_way_back(Candidate& candidate) {
-    const NearestPoint& nearest = candidate.nearest;
-    EffectPoint half_way = candidate.point;
-    bool is_near = true;
-    for (Eigen::Index k = 0; k < half_way.size(); ++k) {
-      const double off = 0.5 * (half_way.value()[k] - nearest.point.value()[k]);
-      half_way = half_way.with(k, nearest.point.value()[k] + off);
-      is_near = is_near && std::abs(off) <= 0.1 * half_way.step(k);
-    }
-    candidate.point = is_near ? nearest.point : half_way.rounded();
-    candidate.views = nearest.views;
-    // of a parabola whose end the step was to be
-    candidate.expected = is_near ? nearest.distance : nearest.distance - 0.75 * (nearest.distance - candidate.expected);
-    candidate.settled = is_near;
-  }
-
-  /// Of places and times. What changes no more than chaos does is held, unless strengths are still on their way, since
-  /// a weak effect's time does not tell: one camera may not tell how far off something is. A step of what hardly moves
-  /// any more is halved, as long as half of it tells four times as much as chaos does: a jet that is moved by more than
-  /// its width says nothing of which way to go.
-  /// @return whether any was halved.
-  static bool set_steps(const Candidate& candidate, EffectPoint& next) {
-    constexpr double halvable = 4 * 4 + 1;  // of a whole step, which chaos is part of
-    const auto moves = [&](Eigen::Index k) {
-      return std::abs(next.value()[k] - candidate.point.value()[k]) >= 0.5 * candidate.point.step(k);
-    };
-    bool strength_moves = false, is_finer = false;
-    for (Eigen::Index k = 0; k < next.size(); ++k) {
-      strength_moves = strength_moves || (!next.is_place_or_time(k) && moves(k));
-    }
-    for (Eigen::Index k = 0; k < next.size(); ++k) {
-      if (!next.is_place_or_time(k) || next.is_held(k)) {
-        continue;
-      }
-      if (!tells(candidate.views, k)) {
-        if (!strength_moves) {
-          next.hold(k);
-        }
-      } else if (!moves(k) && tells(candidate.views, k, halvable)) {
-        next.refine(k);
-        is_finer = true;
-      }
-    }
-    return is_finer;
   }
 
   /// @param seen of runs at the point, then below and above of each of its numbers that is not held.
@@ -531,6 +401,8 @@ class EffectRefiner {
       return std::nullopt;
     }
     RefinementView view{&recorded.space(), *middle};
+    view.side_chaos =
+        recorded.chaos() / static_cast<double>(seeds) - recorded.chaos() / static_cast<double>(middle_seeds());
     view.chaos.resize(point.size());
     for (Eigen::MatrixXd* each : {&view.slope, &view.below, &view.above}) {
       each->resize(middle->size(), point.size());
