@@ -88,7 +88,7 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
 }
 
 /// Knows of drag, a pull, the speed (which is tolerated within 1 %), poses that are late, fat masks and, if it is told
-/// where it usually is, a tap.
+/// where it usually is, a tap. A window of an effect is one of the pull's beats.
 class JetModel {
  public:
   explicit JetModel(double angle = 0.9, const std::optional<decant::Vector3<double>>& tap = {}) : angle_(angle) {
@@ -126,8 +126,10 @@ class JetModel {
       }
     }
     decant::Vector3<double> tap = decant::Vector3<double>::Zero();
+    decant::TimeWindow beat{0, 0};
     for (const decant::AppliedEffect& applied : run.effects) {
       strength.at(applied.effect) = applied.strength[0];
+      beat = applied.window.value_or(beat);
       if (effects_[applied.effect].place) {
         tap = applied.place.value_or(*effects_[applied.effect].place);
       }
@@ -136,8 +138,16 @@ class JetModel {
       return {};
     }
     strength.resize(6, 0);
-    return film_of({strength[0], strength[1], strength[2], strength[3], 0, static_cast<int>(strength[4]), strength[5],
-                    tap.x(), tap.y()},
+    return film_of({.drag = strength[0],
+                    .pull = strength[1],
+                    .speed = strength[2],
+                    .late = strength[3],
+                    .fatter = static_cast<int>(strength[4]),
+                    .tap = strength[5],
+                    .tap_x = tap.x(),
+                    .tap_y = tap.y(),
+                    .beat_from = beat.from,
+                    .beat_until = beat.until},
                    run.seed, angle_);
   }
 

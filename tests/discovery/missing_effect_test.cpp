@@ -17,12 +17,15 @@
 
 #include "catch.hpp"
 #include "jet_model.hpp"
+#include "pull_models.hpp"
 
 using namespace decant;
+using decant_test::BeatModel;
 using decant_test::film_of;
 using decant_test::Jet;
 using decant_test::JetModel;
 using decant_test::LocatingJetModel;
+using decant_test::PullModel;
 
 namespace {
 
@@ -145,88 +148,6 @@ class WithoutTap : public LocatingJetModel {
 
  private:
   std::vector<Effect> effects_{LocatingJetModel::effects()};
-};
-
-/// Knows of a pull that lasts, of one that passes, usually early, and of a nozzle that is faster than assumed.
-class PullModel {
- public:
-  static constexpr std::size_t passing = 1;
-
-  PullModel() {
-    const auto add = [&](const char* name, const EffectComponent& component) {
-      Effect& effect = effects_.emplace_back();
-      effect.name = name;
-      effect.unit = "m/s^2";
-      effect.components = {component};
-      return &effect;
-    };
-    add("pull", {"", 0, -1.5, 1.5, 0.05});
-    Effect& gust = *add("pull", {"", 0, -1.5, 1.5});
-    gust.where = "for a while";
-    gust.window = TimeWindow{0.15, 0.55};
-    gust.window_tolerance = 0.4;
-    add("speed", {"", 1, 0.85, 1.15, 0.01});
-  }
-
-  const std::vector<Effect>& effects() const noexcept { return effects_; }
-
-  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
-    Jet jet;
-    std::mt19937 random(run.seed + 77);
-    for (std::size_t k = 0; k < effects_.size(); ++k) {
-      const double share = static_cast<double>(random()) / 2147483648.0 - 1;
-      set(jet, k, effects_[k].components[0].base + (run.tolerated ? share * effects_[k].components[0].tolerance : 0));
-    }
-    for (const AppliedEffect& applied : run.effects) {
-      set(jet, applied.effect, applied.strength[0]);
-      if (applied.effect == passing) {
-        const TimeWindow window = applied.window.value_or(*effects_[passing].window);
-        jet.gust_from = window.from;
-        jet.gust_until = window.until;
-      }
-    }
-    return film_of(jet, run.seed);
-  }
-
- private:
-  static void set(Jet& jet, std::size_t effect, double strength) {
-    (effect == 0 ? jet.pull : effect == passing ? jet.gust : jet.speed) = strength;
-  }
-
-  std::vector<Effect> effects_{};
-};
-static_assert(ForwardModel<PullModel>);
-
-/// Knows of a pull that is steady or comes in beats, of drag, and of a nozzle that is faster than assumed.
-class BeatModel {
- public:
-  BeatModel() {
-    effects_.erase(effects_.begin() + 3, effects_.end());
-    effects_[pull].window = TimeWindow{};
-    effects_[pull].window_tolerance = 0.1;
-    for (const double period : {0.3, 0.36, 0.43, 0.52}) {
-      for (int quarter = 0; quarter < 4; ++quarter) {
-        const double from = 0.4 + 0.25 * quarter * period;
-        effects_[pull].beats.push_back({from, from + period});
-      }
-    }
-  }
-  const std::vector<Effect>& effects() const noexcept { return effects_; }
-  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
-    if (run.effects.empty() || run.effects[0].effect != pull || !run.effects[0].window) {
-      return jet_.predict(run);
-    }
-    Jet jet;
-    jet.pull = run.effects[0].strength[0];
-    jet.beat_from = run.effects[0].window->from;
-    jet.beat_until = run.effects[0].window->until;
-    return film_of(jet, run.seed);
-  }
-
- private:
-  static constexpr std::size_t pull = 1;
-  JetModel jet_{0.9};
-  std::vector<Effect> effects_{jet_.effects()};
 };
 
 }  // namespace
