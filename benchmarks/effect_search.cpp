@@ -35,7 +35,7 @@ class Figures {
   }
   /// How far something is off, of which the root of the mean square is.
   void add_off(const std::string& name, const std::string& unit, double value) {
-    figure(name + " off by, root mean square", unit, true).push_back(value);
+    figure(name + " off by (RMS)", unit, true).push_back(value);
   }
 
   void report(Report& report, long films, int threads) const {
@@ -103,8 +103,7 @@ void measure(const Options& options, Report& report) {
         jet.tap_x = x;
         jet.tap_y = y;
         search(model, jet, 71 + static_cast<std::uint32_t>(k), 5, threads, figures, [&](const RefinedEffect& tap) {
-          figures.add_off("place, as the camera sees it,", "mm",
-                          1e3 * (*tap.place - Vector3<double>(x, y, 0)).head<2>().norm());
+          figures.add_off("place in the picture", "mm", 1e3 * (*tap.place - Vector3<double>(x, y, 0)).head<2>().norm());
           figures.add_off("strength", "%", 100 * (tap.strength[0] / jet.tap - 1));
         });
       }
