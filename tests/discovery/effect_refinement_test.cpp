@@ -144,6 +144,16 @@ TEST_CASE("effect point: a beat is looked for around the one to begin with, and 
   CHECK(beating.with(1, 1.3).applied(0).window->from == Approx(1.28));
 }
 
+TEST_CASE("effect: beats are of one that has a window, and begin before they end") {
+  Effect air = named("air", {{"", 0, 0, 8}});
+  air.beats = {{1, 1.25}};
+  CHECK_THROWS_WITH(validate(air), decant_test::contains("'air': beats must be"));
+  air.window = TimeWindow{};
+  CHECK_NOTHROW(validate(air));
+  air.beats.push_back({1.5, 1.5});
+  CHECK_THROWS_WITH(validate(air), decant_test::contains("beginning before their end"));
+}
+
 TEST_CASE("effect point: what is not looked for is no number of it") {
   Effect leak = named("leak", {{"", 0, 0, 40}});
   leak.place = Vector3<double>(0, 0, 0);  // without a tolerance

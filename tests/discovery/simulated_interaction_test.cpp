@@ -432,7 +432,17 @@ TEST_CASE("simulated interaction: obstacles go with their body, and necks hold l
     }
     return report.contents[0].volume;
   };
-  CHECK(left_in_cup(run_with(pour, "back_pressure", {8})) > 1.3 * left_in_cup({{}, 1, false}));
+  ModelRun held_up = run_with(pour, "back_pressure", {8});
+  CHECK(left_in_cup(held_up) > 1.3 * left_in_cup({{}, 1, false}));
+  const auto beat_of = [&](const ModelRun& run) {
+    PourModel started = pour.started(run);
+    return std::pair(started.force<BackPressure<float>>().beat, started.time());
+  };
+  CHECK(beat_of(held_up).first.share(0.05) == 1);  // in the mean over many beats
+  held_up.effects[0].window = TimeWindow{0.2, 0.45};
+  const auto [beat, begin] = beat_of(held_up);
+  CHECK(beat.from == Approx(begin + 0.2 - pour.scene().times.front()));
+  CHECK(beat.until == Approx(begin + 0.45 - pour.scene().times.front()));
 }
 
 TEST_CASE("simulated interaction: what is tolerated is drawn within its tolerance, by the seed") {
