@@ -74,12 +74,7 @@ class BeatModel : public JetModel {
     effects_.erase(effects_.begin() + 3, effects_.end());
     effects_[pull].window = decant::TimeWindow{};
     effects_[pull].window_tolerance = 0.1;
-    for (const double period : {0.3, 0.36, 0.43, 0.52}) {
-      for (int quarter = 0; quarter < 4; ++quarter) {
-        const double from = 0.4 + 0.25 * quarter * period;
-        effects_[pull].beats.push_back({from, from + period});
-      }
-    }
+    effects_[pull].beats = decant::beats_to_try(0.3, 0.4, 4);
   }
   const std::vector<decant::Effect>& effects() const noexcept { return effects_; }
 

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <decant/discovery/refinement_path.hpp>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <functional>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -41,10 +39,9 @@ class Formula {
 
   Eigen::VectorXd at(const EffectPoint& point) const { return function_(point.value()); }
 
-  /// @param chaos that slopes are said to have, as a distance.
-  RefinementView around(const EffectPoint& point, double chaos = 0) const {
+  RefinementView around(const EffectPoint& point) const {
     RefinementView view{space_, at(point)};
-    view.chaos = Eigen::VectorXd::Constant(point.size(), chaos);
+    view.chaos = Eigen::VectorXd::Zero(point.size());
     for (Eigen::MatrixXd* each : {&view.slope, &view.below, &view.above}) {
       each->setZero(features, point.size());
     }

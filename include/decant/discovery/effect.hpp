@@ -51,6 +51,20 @@ struct TimeWindow {
   double until = +std::numeric_limits<double>::infinity();
 };
 
+/// Beats to try, for Effect::beats: of some periods, a fifth apart, each at four phases. @param shortest of the periods
+/// [s]. @param first about when beats are counted from [s].
+inline std::vector<TimeWindow> beats_to_try(double shortest, double first, int periods = 6) {
+  std::vector<TimeWindow> beats;
+  double period = shortest;
+  for (int k = 0; k < periods; ++k, period *= 1.2) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      const double from = first + 0.25 * quarter * period;
+      beats.push_back({from, from + period});
+    }
+  }
+  return beats;
+}
+
 /// An effect that a model can be given at any strength.
 struct Effect {
   std::string name{};    ///< as scripts have it, such as "drag_linear"; several may have one name in different places

@@ -74,12 +74,16 @@ class EffectRefiner {
     }
     const bool faint = before <= known.chance.largest_distance;  // few runs would tell more of chaos than of it
     std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
+    const auto evidence_at = [&](const DistanceLeft& distance, const EffectPoint& point) {
+      Evidence result = evidence_of(distance.value, distance.deviation, known.chance);
+      result.value -= static_cast<double>(point.size());
+      return result;
+    };
     std::vector<Evidence> evidence;
     double least = std::numeric_limits<double>::infinity();
     std::size_t best = 0;
     for (std::size_t k = 0; k < points.size(); ++k) {
-      evidence.push_back(evidence_of(left[k].value, left[k].deviation, known.chance));
-      evidence.back().value -= static_cast<double>(points[k].size());
+      evidence.push_back(evidence_at(left[k], points[k]));
       least = std::min(least, left[k].value);
       best = evidence[k].value > evidence[best].value ? k : best;
     }
@@ -90,8 +94,7 @@ class EffectRefiner {
       if (relative_fall(left[best].value, there.value) > known.chance.fall) {
         points[best] = candidates[best].path.nearest();
         left[best] = there;
-        evidence[best] = evidence_of(there.value, there.deviation, known.chance);
-        evidence[best].value -= static_cast<double>(points[best].size());
+        evidence[best] = evidence_at(there, points[best]);
         least = std::min(least, there.value);
       }
     }

@@ -401,20 +401,6 @@ struct Neck {
   double length = 0, radius = 0;                    ///< [m]
 };
 
-/// Beats to try, for Effect::beats: of six periods, a fifth apart, each at four phases. @param shortest, first [s]:
-/// about when they are counted from.
-inline std::vector<TimeWindow> beats_to_try(double shortest, double first) {
-  std::vector<TimeWindow> beats;
-  double period = shortest;
-  for (int k = 0; k < 6; ++k, period *= 1.2) {
-    for (int quarter = 0; quarter < 4; ++quarter) {
-      const double from = first + 0.25 * quarter * period;
-      beats.push_back({from, from + period});
-    }
-  }
-  return beats;
-}
-
 /// Air that comes into a container only past the liquid that runs out. @param where in words. @param middle of the time
 /// in which it does [s], which beats are counted from: bubbles come in 2 to 5 times a second.
 template <class Model>
