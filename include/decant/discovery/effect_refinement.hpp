@@ -201,7 +201,8 @@ inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number,
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
-/// No number moves more than two of its steps, nor out of its range.
+/// No place or time moves more than two of its steps, no strength more than four, which effects are closer to linear in;
+/// nor does any leave its range.
 /// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos
 /// makes steps shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates
 /// scatter would seem to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).
@@ -250,7 +251,8 @@ inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<Refin
   }
   for (Eigen::Index k = 0; k < size; ++k) {
     const auto [low, high] = at.range(k);
-    move[k] = std::clamp(at.value()[k] + unit[k] * std::clamp(move[k], -2.0, 2.0), low, high) - at.value()[k];
+    const double most = at.is_place_or_time(k) ? 2 : 4;
+    move[k] = std::clamp(at.value()[k] + unit[k] * std::clamp(move[k], -most, most), low, high) - at.value()[k];
   }
   return move;
 }
