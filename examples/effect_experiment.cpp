@@ -14,20 +14,20 @@
 
 #include "support/effect_experiment.hpp"
 #include "support/effect_tables.hpp"
+#include "support/experiment_command.hpp"
 #include "support/experiment_output.hpp"
 #include "support/tool.hpp"
 
 int main(int count, char** values) {
-  std::string folder, json_file, report_file;
   example::CaseRange range = example::CaseRange::Develop;
   std::vector<std::string> kinds{"nothing", "moderate", "weak", "outside", "measurement"};
   int first = 0, most = 1000;
   bool advise = false;
   std::vector<std::size_t> scenarios;
   example::EffectExperimentOptions options;
-  double reality_mm = 1e3 * options.recording.spacing, model_mm = 1e3 * options.model.model.spacing;
+  example::ExperimentCommand command(options.recording.longest, options.recording.spacing, options.model.model.spacing);
   CLI::App app("Finds what a simulation lacks in pours in which something is hidden, and scores the answers.");
-  app.add_option("folder", folder, "where recordings, runs and answers are kept")->required();
+  command.add_to(app, 1);
   app.add_option("--range", range, "develop: to choose a method by; report: to say how good it is")
       ->transform(CLI::CheckedTransformer(example::case_ranges()));
   app.add_option(
@@ -48,23 +48,17 @@ int main(int count, char** values) {
                "where several effects are left, has another interaction recorded, one that is advised and one that is "
                "drawn by chance, and judges again");
   app.add_flag("--both", options.both, "learns from both pours of a case, and holds out none");
-  app.add_option("--threads", options.threads, "recordings or runs side by side, each on one thread; 0: one per core")
-      ->check(CLI::Range(0, 1024));
-  app.add_option("--model-spacing-mm", model_mm, "of the model's particles")->check(CLI::Range(1.0, 20.0));
   app.add_option("--draws", options.search.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
       ->check(CLI::Range(5, 1000));
-  app.add_option("--json", json_file, "writes results and tables");
-  app.add_option("--report", report_file, "writes a page with tables, for a browser");
-  app.add_flag("--again", options.again, "judges anew what is there already; recordings and runs are kept");
-  // smaller recordings, for tests; group "" is not in the help
-  app.add_option("--seconds", options.recording.longest)->check(CLI::Range(0.1, 60.0))->group("");
-  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
   return example::run_tool(app, count, values, [&] {
-    options.folder = folder;
-    options.recording.spacing = 1e-3 * reality_mm;
-    options.model.model.spacing = 1e-3 * model_mm;
-    example::expect_writable({json_file, report_file});
+    options.folder = command.folder;
+    options.threads = command.threads;
+    options.again = command.again;
+    options.recording.longest = command.seconds;
+    options.recording.spacing = 1e-3 * command.reality_mm;
+    options.model.model.spacing = 1e-3 * command.model_mm;
+    example::expect_writable({command.json_file, command.report_file});
     std::vector<example::EffectCase> cases;
     for (const std::string& kind : kinds) {
       if (options.references > 0 && !example::is_of_pours(example::case_kinds().at(kind))) {
@@ -87,8 +81,8 @@ int main(int count, char** values) {
       experiment.follow_advice(cases);
     }
     return example::tell_experiment(
-        {"What the model lacks", experiment.recordings(cases), 3, reality_mm,
-         decant::detail::number_text(model_mm) + " mm in the model. What is hidden is not told to the search."},
-        experiment.folder(), example::effect_tables(experiment, cases), json_file, report_file);
+        {"What the model lacks", experiment.recordings(cases), 3, command.reality_mm,
+         decant::detail::number_text(command.model_mm) + " mm in the model. What is hidden is not told to the search."},
+        experiment.folder(), example::effect_tables(experiment, cases), command.json_file, command.report_file);
   });
 }

@@ -10,6 +10,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "support/experiment_command.hpp"
 #include "support/experiment_output.hpp"
 #include "support/fill_experiment.hpp"
 #include "support/fill_tables.hpp"
@@ -32,32 +33,22 @@ void keep(const std::vector<std::string>& only, std::vector<example::Pour>& leve
 }  // namespace
 
 int main(int count, char** values) {
-  std::string folder, json_file, report_file, set = "all";
+  std::string set = "all";
   std::vector<std::string> only;
   example::FillExperimentOptions options;
-  double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
+  example::ExperimentCommand command(options);
   CLI::App app("Estimates how much was in containers that are poured from, and scores the estimates.");
-  app.add_option("folder", folder, "where recordings and results are kept")->required();
+  command.add_to(app, 0);
   app.add_option("--set", set,
                  "levels: the paper's pours, empty to 90 % full, by each method; amounts: any amounts, by the default "
                  "method; all: both")
       ->check(CLI::IsMember({"levels", "amounts", "all"}));
   app.add_option("--only", only, "recordings of the set, such as cup_30_1, several by commas")->delimiter(',');
-  app.add_option("--threads", options.threads, "runs side by side, each on one thread; 0: one per core")
-      ->check(CLI::Range(0, 1024));
-  app.add_option("--json", json_file, "writes results and tables");
-  app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
-  app.add_flag("--again", options.again, "computes results that are there already anew; recordings are kept");
-  // smaller recordings, for tests; group "" is not in the help
-  app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
-  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
-  app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(0.0, 20.0))->group("");
+  // a coarser grid, for tests; group "" is not in the help
   app.add_option("--grid-step", options.grid_step)->check(CLI::Range(2, 50))->group("");
   return example::run_tool(app, count, values, [&] {
-    options.folder = folder;
-    options.reality_spacing = 1e-3 * reality_mm;
-    options.model_spacing = 1e-3 * model_mm;
-    example::expect_writable({json_file, report_file});
+    command.give_to(options);
+    example::expect_writable({command.json_file, command.report_file});
     const std::vector<std::string> methods = example::FillOptions{}.methods;
     auto levels = set == "amounts" ? std::vector<example::Pour>() : example::level_pours();
     auto amounts = set == "levels" ? std::vector<example::Pour>() : example::amount_pours();
@@ -65,10 +56,11 @@ int main(int count, char** values) {
     example::FillExperiment experiment(options);
     experiment.run(levels, methods);
     experiment.run(amounts, {});
-    return example::tell_experiment({"How much was in it", levels.size() + amounts.size(), options.duration, reality_mm,
-                                     "6000 of them in a full container of the model. The amount is hidden from the "
-                                     "estimates."},
-                                    experiment.folder(), example::fill_tables(experiment, levels, amounts, methods),
-                                    json_file, report_file);
+    return example::tell_experiment(
+        {"How much was in it", levels.size() + amounts.size(), options.duration, command.reality_mm,
+         "6000 of them in a full container of the model. The amount is hidden from the "
+         "estimates."},
+        experiment.folder(), example::fill_tables(experiment, levels, amounts, methods), command.json_file,
+        command.report_file);
   });
 }

@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "support/experiment_command.hpp"
 #include "support/experiment_output.hpp"
 #include "support/junction_experiment.hpp"
 #include "support/junction_tables.hpp"
@@ -31,13 +32,13 @@ std::size_t keep(std::vector<example::JunctionCase>& cases, const std::vector<st
 }  // namespace
 
 int main(int count, char** values) {
-  std::string folder, json_file, report_file, set = "all";
+  std::string set = "all";
   std::vector<std::string> only, methods{example::default_method};
   example::JunctionExperimentOptions options;
-  double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
+  example::ExperimentCommand command(options);
   bool keep_all = false;
   CLI::App app("Finds what blocks pipe junctions by what runs out of them, and scores the answers.");
-  app.add_option("folder", folder, "where recordings and results are kept")->required();
+  command.add_to(app, 0);
   app.add_option("--set", set,
                  "configurations: the paper's five, four trials each, by each method; openings: one leg 10 to 90 % "
                  "open; others: what is none of the five; all: these three")
@@ -46,23 +47,12 @@ int main(int count, char** values) {
       ->delimiter(',')
       ->check(CLI::IsMember(example::weighing_methods()));
   app.add_option("--only", only, "recordings of the set, such as pipe_left_1, several by commas")->delimiter(',');
-  app.add_option("--threads", options.threads, "runs side by side, each on one thread; 0: one per core")
-      ->check(CLI::Range(0, 1024));
-  app.add_option("--json", json_file, "writes results and tables");
-  app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
   app.add_flag("--keep-all", keep_all,
                "gives up no hypothesis, to see what giving up saves and whether it changes answers");
-  app.add_flag("--again", options.again, "computes results that are there already anew; recordings are kept");
-  // smaller recordings, for tests; group "" is not in the help
-  app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
-  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
-  app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(0.0, 20.0))->group("");
   return example::run_tool(app, count, values, [&] {
-    options.folder = folder;
-    options.reality_spacing = 1e-3 * reality_mm;
-    options.model_spacing = 1e-3 * model_mm;
+    command.give_to(options);
     options.least_probability = keep_all ? 0 : options.least_probability;
-    example::expect_writable({json_file, report_file});
+    example::expect_writable({command.json_file, command.report_file});
     const auto chosen = [&](const char* name, std::vector<example::JunctionCase> cases) {
       return set == "all" || set == name ? cases : std::vector<example::JunctionCase>();
     };
@@ -82,9 +72,9 @@ int main(int count, char** values) {
       experiment.run(*cases, cases == &configurations ? methods : std::vector<std::string>{example::default_method});
     }
     return example::tell_experiment(
-        {"What blocks the junction", recordings, options.duration, reality_mm,
+        {"What blocks the junction", recordings, options.duration, command.reality_mm,
          "five of them across a leg in the model. What blocks a leg is hidden from the answers."},
-        experiment.folder(), example::junction_tables(experiment, configurations, openings, others, methods), json_file,
-        report_file);
+        experiment.folder(), example::junction_tables(experiment, configurations, openings, others, methods),
+        command.json_file, command.report_file);
   });
 }

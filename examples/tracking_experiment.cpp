@@ -14,6 +14,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "support/experiment_command.hpp"
 #include "support/experiment_tables.hpp"
 #include "support/result_file.hpp"
 #include "support/tool.hpp"
@@ -136,12 +137,12 @@ nlohmann::json results_json(const std::vector<example::TrackingJob>& jobs,
 }  // namespace
 
 int main(int count, char** values) {
-  std::string set = "pours", folder, json_file, report_file;
+  std::string set = "pours";
   std::vector<std::string> methods, only, conditions;
   example::ExperimentOptions options;
-  double reality_mm = 1e3 * options.reality_spacing, model_mm = 1e3 * options.model_spacing;
+  example::ExperimentCommand command(options);
   CLI::App app("Tracks twins of pours by several methods, as in Schenck and Fox (2017), and scores them.");
-  app.add_option("folder", folder, "where recordings and results are kept")->required();
+  command.add_to(app, 1);
   app.add_option("--set", set,
                  "pours: the paper's, by method; harmless: nothing is wrong with the model; wrong_amount: the model is "
                  "told too much or too little; sweep: what a camera and a tracker of poses get wrong, more and more")
@@ -154,20 +155,9 @@ int main(int count, char** values) {
       ->delimiter(',')
       ->check(CLI::IsMember(condition_names()));
   app.add_option("--only", only, "recordings of the set, such as cup_30_1, several by commas")->delimiter(',');
-  app.add_option("--threads", options.threads, "runs side by side, each on one thread; 0: one per core")
-      ->check(CLI::Range(0, 1024));
-  app.add_option("--json", json_file, "writes results and tables");
-  app.add_option("--report", report_file, "writes a page with tables and charts, for a browser");
-  app.add_flag("--again", options.again, "computes results that are there already anew; recordings are kept");
-  // smaller recordings, for tests; group "" is not in the help
-  app.add_option("--seconds", options.duration)->check(CLI::Range(0.1, 60.0))->group("");
-  app.add_option("--spacing-mm", reality_mm)->check(CLI::Range(1.0, 20.0))->group("");
-  app.add_option("--model-spacing-mm", model_mm)->check(CLI::Range(1.0, 20.0))->group("");
   return example::run_tool(app, count, values, [&] {
-    options.folder = folder;
-    options.reality_spacing = 1e-3 * reality_mm;
-    options.model_spacing = 1e-3 * model_mm;
-    example::expect_writable({json_file, report_file});
+    command.give_to(options);
+    example::expect_writable({command.json_file, command.report_file});
     const Plan plan = plan_of(set, methods, only, conditions);
     const std::vector<example::TrackingJob> jobs = jobs_of(set, plan);
     example::TrackingExperiment experiment(options);
@@ -176,22 +166,23 @@ int main(int count, char** values) {
     example::print_sections(sections);
     std::printf("%zu of %zu recordings made, %zu of %zu results computed\n", experiment.recorded(), plan.pours.size(),
                 experiment.computed(), experiment.asked());
-    if (!json_file.empty()) {
+    if (!command.json_file.empty()) {
       nlohmann::json json;
       json["set"] = set;
       json["results"] = results_json(jobs, experiment);
       json["tables"] = example::sections_json(sections);
       json["computed"] = experiment.computed();
-      example::write_result(json_file, json);
+      example::write_result(command.json_file, json);
     }
-    if (!report_file.empty()) {
-      example::write_experiment_report(
-          report_file, "Tracking experiment: " + set,
-          std::to_string(plan.pours.size()) + (plan.pours.size() == 1 ? " recording of " : " recordings of ") +
-              example::detail::figure(options.duration, 1) + " s; particles of " +
-              example::detail::figure(reality_mm, 1) + " mm in reality and " + example::detail::figure(model_mm, 1) +
-              " mm in the model. Scores are intersections over unions of silhouettes.",
-          sections);
+    if (!command.report_file.empty()) {
+      example::write_experiment_report(command.report_file, "Tracking experiment: " + set,
+                                       std::to_string(plan.pours.size()) +
+                                           (plan.pours.size() == 1 ? " recording of " : " recordings of ") +
+                                           example::detail::figure(options.duration, 1) + " s; particles of " +
+                                           example::detail::figure(command.reality_mm, 1) + " mm in reality and " +
+                                           example::detail::figure(command.model_mm, 1) +
+                                           " mm in the model. Scores are intersections over unions of silhouettes.",
+                                       sections);
     }
     const auto& results = experiment.results();
     return std::any_of(results.begin(), results.end(), [](const auto& entry) { return entry.second["status"] != "ok"; })
