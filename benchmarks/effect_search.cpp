@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 /// How well a search finds where and when an effect acts, on films of thrown balls that are made in an instant: a tap
-/// at places that are not the usual one, a pull for a while at other times than usual, a pull in beats. What is left
-/// of a gap is set beside what would be left if nothing were missing.
+/// at places that are not the usual one, a pull for a while at other times than usual, a pull in beats; and how well
+/// two of those that there are at once are named. What is left of a gap is set beside what would be left if nothing
+/// were missing.
 
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -90,6 +92,36 @@ void search(const Model& model, const Jet& jet, std::uint32_t seed, std::size_t 
   }
 }
 
+/// Of what is hidden in a film: numbers of a JetModel's effects, with strengths.
+using Hidden = std::map<std::size_t, double>;
+
+/// @param angle, other_angle of the nozzle in a film to learn from and in one to check on.
+void search_two(const Jet& jet, const Hidden& hidden, std::uint32_t seed, int threads, Figures& figures) {
+  constexpr double angle = 0.9, other_angle = 0.6;
+  const Vector3<double> usual(0.15, 0.6, 0);
+  const decant_test::LocatingJetModel model(angle, usual), other(other_angle, usual);
+  ThreadExecutor executor{{threads}};
+  const MissingEffect result = MissingEffectSearch<decant_test::LocatingJetModel>(
+                                   {{"film", &model, film_of(jet, seed, angle)}},
+                                   {{"other", &other, film_of(jet, seed + 500, other_angle)}}, run_jobs_on(executor))
+                                   .find();
+  std::size_t right = 0;
+  for (const RefinedEffect& each : result.found) {
+    right += hidden.contains(each.effect) ? 1 : 0;
+  }
+  const bool named = result.verdict == Verdict::Named && right == result.found.size();
+  figures.add("both are named, and nothing else", "%", named && right == 2 ? 100 : 0);
+  figures.add("one is named, and stands for both", "%", named && right == 1 ? 100 : 0);
+  figures.add("unexplained, or a set", "%", result.verdict != Verdict::Named ? 100 : 0);
+  figures.add("what is not there is named", "%", result.verdict == Verdict::Named && !named ? 100 : 0);
+  figures.add("runs for an answer", "", static_cast<double>(result.runs));
+  for (const RefinedEffect& each : result.found) {
+    if (named && right == 2) {
+      figures.add_off("strengths of both", "%", 100 * (each.strength[0] / hidden.at(each.effect) - 1));
+    }
+  }
+}
+
 void measure(const Options& options, Report& report) {
   const int threads = options.numbers("threads").front(), repetitions = options.numbers("repetitions").front();
   if (const std::string title = "a tap that is not where it usually is"; report.wants(title)) {
@@ -147,6 +179,33 @@ void measure(const Options& options, Report& report) {
                }
              });
     }
+    figures.report(report, films, threads);
+  }
+  if (const std::string title = "two at once"; report.wants(title)) {
+    Figures figures(title);
+    long films = 0;
+    const auto hide = [&](const Jet& jet, const Hidden& hidden) {
+      for (int k = 0; k < repetitions; ++k, ++films) {
+        search_two(jet, hidden, 300 + static_cast<std::uint32_t>(films), threads, figures);
+      }
+    };
+    constexpr std::size_t drag = 0, pull = 1, speed = 2, late = 3, tap = 5;
+    Jet tapped;
+    tapped.tap = 25;
+    tapped.tap_x = 0.22;
+    tapped.tap_y = 0.67;
+    const auto tapped_and = [&](double Jet::*which, double strength) {
+      Jet jet = tapped;
+      jet.*which = strength;
+      return jet;
+    };
+    hide(tapped_and(&Jet::drag, 0.6), {{tap, 25}, {drag, 0.6}});
+    hide(tapped_and(&Jet::pull, 0.8), {{tap, 25}, {pull, 0.8}});
+    hide(tapped_and(&Jet::late, 0.05), {{tap, 25}, {late, 0.05}});
+    hide({.drag = 0.8, .late = 0.05}, {{drag, 0.8}, {late, 0.05}});
+    hide({.drag = 0.6, .pull = -0.8}, {{drag, 0.6}, {pull, -0.8}});
+    hide({.pull = 0.8, .speed = 1.08}, {{pull, 0.8}, {speed, 1.08}});
+    hide({.pull = 0.8, .late = 0.05}, {{pull, 0.8}, {late, 0.05}});
     figures.report(report, films, threads);
   }
 }
