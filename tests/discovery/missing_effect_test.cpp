@@ -187,10 +187,41 @@ TEST_CASE("missing effect: where all else may be chance, what an effect takes aw
                                    .find();
   REQUIRE(result.learn.before < result.judgement.chance.largest_distance);
   REQUIRE(!result.refined.empty());
-  CHECK(result.refined.front().share < settings.least_share_to_chance);
+  CHECK(result.refined.front().share < settings.least_share);
   CHECK(relative_fall(result.learn.before, result.refined.front().distance) > result.learn.by_chance);
   CHECK((result.verdict == Verdict::Named || result.verdict == Verdict::OneOf));
   CHECK(name_of(result) == "speed");
+}
+
+TEST_CASE(
+    "missing effect: what leaves no more than chance explains a gap, although reality is off by more than runs are") {
+  const JetModel model(0.9);
+  ThreadExecutor executor{{1}};
+  int within = 0, nearly = 0;
+  for (const std::uint32_t seed : {428U, 434U, 435U, 438U, 440U}) {
+    Jet slow;
+    slow.speed = 0.97;
+    slow.gust = 0.75;  // as reality always has it; no effect of the model's, and hardly a gap alone
+    const MissingEffect result =
+        MissingEffectSearch<JetModel>({{"a", &model, film_of(slow, seed, 0.9)}}, {}, run_jobs_on(executor)).find();
+    INFO("seed " << seed);
+    const ChanceLevel& chance = result.judgement.chance;
+    REQUIRE(!result.refined.empty());
+    const RefinedEffect& best = result.refined.front();
+    CHECK(result.learn.before > chance.largest_distance);
+    CHECK(best.share < MissingEffectSettings{}.least_share);
+    CHECK(model.effects()[best.effect].name == "speed");
+    CHECK(relative_fall(result.learn.before, best.distance) > chance.fall);
+    const bool answered = result.verdict == Verdict::Named || result.verdict == Verdict::OneOf;
+    if (best.distance <= chance.largest_distance) {
+      ++within;
+      CHECK(answered);
+    } else {  // by less than a few runs tell
+      nearly += answered ? 1 : 0;
+    }
+  }
+  CHECK(within >= 2);
+  CHECK(nearly >= 1);
 }
 
 TEST_CASE("missing effect: each is named with its strength, and confirmed where it was not looked at") {
@@ -692,7 +723,6 @@ TEST_CASE("missing effect: the more effects, the less they may leave, and one th
 TEST_CASE("missing effect: what explains enough alone stands where a second one does not explain enough") {
   MissingEffectSettings settings;
   settings.least_share = 0.54;  // two would have to explain 0.77; they explain 0.55 and 0.76 of a gust
-  settings.least_share_to_chance = 1;
   settings.most_left = 100;
   const MissingEffect result = found_in({0, 0, 1, 0, 4}, 75, settings);
   CHECK(result.verdict == Verdict::Named);

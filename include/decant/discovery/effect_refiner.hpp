@@ -37,6 +37,7 @@ namespace decant::inline DECANT_TARGET {
 struct RefinedTogether {
   std::vector<RefinedEffect> effects{};  ///< the new one last
   double distance = 0, share = 0;        ///< see RefinedEffect
+  double distance_deviation = 0;         ///< standard, of few runs
   /// Of what is left, less one for each number that was fitted: so much they take away by chance (Akaike, IEEE Trans.
   /// Autom. Control 19, 1974).
   Evidence evidence{};
@@ -105,6 +106,7 @@ class EffectRefiner {
       }
       RefinedTogether one;
       one.distance = left[k].value;
+      one.distance_deviation = left[k].deviation;
       one.evidence = evidence[k];
       one.share = share_of_reducible(before, one.distance, known.chance.distance, least);
       // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)

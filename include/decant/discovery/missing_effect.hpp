@@ -75,9 +75,8 @@ class MissingEffectSearch {
     expects(settings_.refined >= 1 && settings_.refinement_rounds >= 1 && settings_.refinement_seeds >= 1,
             "MissingEffectSettings: refined, refinement_rounds, refinement_seeds", ">= 1", settings_.refined);
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
-    for (const double share : {settings_.least_share, settings_.least_share_to_chance}) {
-      expects(share >= 0 && share <= 1, "MissingEffectSettings: least_share, least_share_to_chance", "0 .. 1", share);
-    }
+    expects(settings_.least_share >= 0 && settings_.least_share <= 1, "MissingEffectSettings: least_share", "0 .. 1",
+            settings_.least_share);
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
     expects(settings_.most_left > 0, "MissingEffectSettings: most_left", "> 0", settings_.most_left);
@@ -133,16 +132,17 @@ class MissingEffectSearch {
       const std::vector<RefinedTogether> refined = refine.best(judgement, known, result.found, result.learn.before);
       const bool gains =
           !refined.empty() && relative_fall(result.learn.after, refined.front().distance) > known.chance.fall;
-      const bool down_to_chance = !refined.empty() && refined.front().distance <= known.chance.largest_distance;
       // the more effects, the more of what nothing in the catalogue explains they can take over
       const double together = round + 1;
-      const double least =
-          down_to_chance ? settings_.least_share_to_chance : 1 - (1 - settings_.least_share) / together;
+      const double least = 1 - (1 - settings_.least_share) / together;
       const bool leaves_little =
           !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
-      // where all of a recording's distance may be chance, there is no gap but what an effect takes away, nor a share
+      // Where all that is left may be chance, as far as few runs tell, nothing is left to explain, whatever its share:
+      // what reality is off by where nothing is missing may be more than the model's own runs are.
       const bool faint = result.judgement.is_faint();
-      const bool explains = leaves_little && (faint || refined.front().share >= least);
+      const bool down_to_chance = !refined.empty() && refined.front().distance - refined.front().distance_deviation <=
+                                                          known.chance.largest_distance;
+      const bool explains = leaves_little && (down_to_chance || refined.front().share >= least);
       if (round == 0) {
         // what effects explain by curves through few runs, and do not in runs with them, is no gap
         gap_stands = !faint || gains;
@@ -165,7 +165,7 @@ class MissingEffectSearch {
       if (round == 0 && explains) {
         result.one_of = undecided(result.refined, known.chance, result.learn.before);
       }
-      if (result.learn.after <= known.chance.largest_distance || result.one_of.size() > 1 ||
+      if (down_to_chance || result.one_of.size() > 1 ||
           (leaves_little && refined.front().share >= settings_.enough_share) ||
           !is_promising(refined.front().share, together)) {
         break;
