@@ -11,6 +11,8 @@
 
 #include <Eigen/Core>
 
+#include <decant/discovery/missing_effect_result.hpp>
+
 #include "catch.hpp"
 
 using namespace decant;
@@ -172,6 +174,26 @@ TEST_CASE("effect point: what is not looked for is no number of it") {
   CHECK(ends.value() == numbers({10, 1}));
   CHECK(ends.range(1).second == Approx(1.3));
   CHECK(ends.applied(0).window->until == 1);
+}
+
+TEST_CASE("refined effect: one that may be tolerated does not stand out") {
+  Effect pan = named("body_pose", {{"x", 0, -10, 10, 1}, {"y", 0, -10, 10, 1}});
+  const auto stands_out = [&](double x, double y, double deviation) {
+    RefinedEffect found;
+    found.strength = numbers({x, y});
+    found.deviation = numbers({deviation, deviation});
+    return is_beyond_tolerance(found, pan);
+  };
+  CHECK(stands_out(0.5, -3, 1));  // -4.6 .. -1.4
+  CHECK_FALSE(stands_out(0.5, -3, 1.3));
+  CHECK(stands_out(3, 0, 1));
+  CHECK_FALSE(stands_out(0.9, -0.9, 0.01));
+  CHECK_FALSE(stands_out(5, 5, std::numeric_limits<double>::quiet_NaN()));
+  for (EffectComponent& each : pan.components) {
+    each.base = 2;
+  }
+  CHECK_FALSE(stands_out(3, 1, 0.1));
+  CHECK(stands_out(2, -3, 1));
 }
 
 TEST_CASE("refinement: one step finds what is linear, in several recordings together") {

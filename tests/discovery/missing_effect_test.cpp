@@ -345,6 +345,8 @@ TEST_CASE("missing effect: what recordings learnt from do not tell apart, others
       REQUIRE(result.found.size() == 1);
       CHECK(model.effects()[result.found.front().effect].name == answer);
       CHECK(result.learn.after == result.found.front().distance);
+      CHECK(result.found.front().deviation[0] > 0.01);  // also of what was not the first one at first
+      CHECK(result.found.front().deviation[0] < 0.2);
       CHECK(result.confirmation == Confirmation::Confirmed);
       CHECK(result.held_out.best_rival > result.held_out.before);  // the other one makes it worse
     }

@@ -99,6 +99,7 @@ class EffectRefiner {
         least = std::min(least, there.value);
       }
     }
+    const std::vector<double> probability = points.empty() ? std::vector<double>() : probabilities(evidence);
     std::vector<RefinedTogether> refined;
     for (std::size_t k = 0; k < points.size(); ++k) {
       if (!std::isfinite(left[k].value)) {
@@ -111,8 +112,9 @@ class EffectRefiner {
       one.share = share_of_reducible(before, one.distance, known.chance.distance, least);
       // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)
       const double more = std::sqrt(std::max(1.0, one.distance / std::max(known.chance.distance, 1e-12)));
+      const bool may_be_it = k == best || probability[k] > 0.5 * (1 - settings_.sure);  // also for what others say
       const Eigen::VectorXd deviation =
-          k == best ? Eigen::VectorXd(more * deviations(points[k], candidates[k].path.views(), known))
+          may_be_it ? Eigen::VectorXd(more * deviations(points[k], candidates[k].path.views(), known))
                     : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
       for (std::size_t part = 0; part < points[k].effects(); ++part) {
         const AppliedEffect applied = points[k].applied(part);

@@ -153,7 +153,11 @@ class MissingEffectSearch {
         }
         set_probabilities(result.refined, evidence);
       }
-      if (!gains || (!stages.empty() && stages.back().explains && !explains)) {  // what was found before stands
+      // beside others, what may be tolerated as well is not what is missing
+      const bool stands_out =
+          gains && (round == 0 || is_beyond_tolerance(refined.front().effects.back(),
+                                                      effects()[refined.front().effects.back().effect]));
+      if (!stands_out || (!stages.empty() && stages.back().explains && !explains)) {  // what was found before stands
         break;
       }
       result.found = refined.front().effects;

@@ -42,6 +42,19 @@ struct RefinedEffect {
   }
 };
 
+/// Whether any of an effect's components is stronger than is tolerated, as far as its interval tells; no if that is not
+/// known.
+inline bool is_beyond_tolerance(const RefinedEffect& found, const Effect& effect) {
+  for (std::size_t k = 0; k < effect.components.size(); ++k) {
+    const EffectComponent& of = effect.components[k];
+    const auto [low, high] = found.interval_90(k);
+    if (low > of.base + of.tolerance || high < of.base - of.tolerance) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// Whether an effect that was found also explains recordings that were not used.
 enum class Confirmation {
   Untested,     ///< there were no such recordings, or nothing was found
