@@ -95,7 +95,7 @@ void search(const Model& model, const Jet& jet, std::uint32_t seed, std::size_t 
 /// Of what is hidden in a film: numbers of a JetModel's effects, with strengths.
 using Hidden = std::map<std::size_t, double>;
 
-/// @param angle, other_angle of the nozzle in a film to learn from and in one to check on.
+/// Learns from one film, and checks on another, of a nozzle that points elsewhere.
 void search_two(const Jet& jet, const Hidden& hidden, std::uint32_t seed, int threads, Figures& figures) {
   constexpr double angle = 0.9, other_angle = 0.6;
   const Vector3<double> usual(0.15, 0.6, 0);
