@@ -680,6 +680,23 @@ TEST_CASE("missing effect: two at once are found one after another") {
   CHECK(result.confirmation == Confirmation::Confirmed);
 }
 
+TEST_CASE("missing effect: a second one that may as well be what is tolerated is not named, however much it explains") {
+  // Beside a pull there is a gust, which no effect is. Late poses, of which some are tolerated, explain much of it.
+  const auto find = [](double pull, double late, std::uint32_t seed) {
+    const Jet jet{0, pull, 1, late, -0.8};
+    const MissingEffect result = found_in(jet, seed);
+    MissingEffectSettings alone;
+    alone.most_effects = 1;
+    CHECK(found_in(jet, seed, alone).runs < result.runs);  // a second one was looked for
+    return result;
+  };
+  const MissingEffect strong = find(1.2, 0.0038, 621);
+  CHECK(strong.verdict == Verdict::Named);
+  CHECK(strong.found.size() == 1);
+  CHECK(name_of(strong) == "pull");
+  CHECK(find(0.6, 0, 601).verdict == Verdict::Unexplained);  // of which the pull alone explains too little
+}
+
 TEST_CASE("missing effect: a second one that does not help where it was not learnt from is none") {
   const JetModel model(0.9), other(0.6);
   ThreadExecutor executor{{1}};

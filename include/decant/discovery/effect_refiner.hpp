@@ -58,75 +58,22 @@ class EffectRefiner {
                                     const std::vector<RefinedEffect>& found, double before) {
     std::vector<Candidate> candidates = chosen(judgement, known, found);
     add_beats(candidates, known, found);
-    const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
-    for (int round = 0; round < most && !candidates.empty(); ++round) {
-      if (round >= settings_.refinement_rounds) {
-        settle_others(candidates);
-      }
-      // none that distances are measured with
-      step_all(candidates, known, static_cast<std::uint32_t>((round < 3 ? 5001 : 10001) + 1000 * round));
-      if (round + 1 < settings_.refinement_rounds) {
-        keep_promising(candidates, known.chance);
-      }
-    }
-    std::vector<EffectPoint> points;
-    for (const Candidate& each : candidates) {
-      points.push_back(each.path.point());
-    }
+    move(candidates, known);
     const bool faint = before <= known.chance.largest_distance;  // few runs would tell more of chaos than of it
-    std::vector<DistanceLeft> left = distances(points, known, faint ? 3 : 1);
-    const auto evidence_at = [&](const DistanceLeft& distance, const EffectPoint& point) {
-      Evidence result = evidence_of(distance.value, distance.deviation, known.chance);
-      result.value -= static_cast<double>(point.size());
-      return result;
-    };
+    const std::vector<Reached> reached = reached_by(candidates, known, faint ? 3 : 1);
     std::vector<Evidence> evidence;
     double least = std::numeric_limits<double>::infinity();
-    std::size_t best = 0;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      evidence.push_back(evidence_at(left[k], points[k]));
-      least = std::min(least, left[k].value);
-      best = evidence[k].value > evidence[best].value ? k : best;
+    for (const Reached& each : reached) {
+      evidence.push_back(each.evidence);
+      least = std::min(least, each.left.value);
     }
-    // nobody has checked the last step; where it led away, the point before it is taken
-    if (!points.empty() &&
-        relative_fall(left[best].value, candidates[best].path.least_distance()) > known.chance.fall) {
-      const DistanceLeft there = distances({candidates[best].path.nearest()}, known, faint ? 3 : 1).front();
-      if (relative_fall(left[best].value, there.value) > known.chance.fall) {
-        points[best] = candidates[best].path.nearest();
-        left[best] = there;
-        evidence[best] = evidence_at(there, points[best]);
-        least = std::min(least, there.value);
-      }
-    }
-    const std::vector<double> probability = points.empty() ? std::vector<double>() : probabilities(evidence);
+    const std::vector<double> probability = reached.empty() ? std::vector<double>() : probabilities(evidence);
     std::vector<RefinedTogether> refined;
-    for (std::size_t k = 0; k < points.size(); ++k) {
-      if (!std::isfinite(left[k].value)) {
-        continue;
-      }
-      RefinedTogether one;
-      one.distance = left[k].value;
-      one.distance_deviation = left[k].deviation;
-      one.evidence = evidence[k];
-      one.share = share_of_reducible(before, one.distance, known.chance.distance, least);
-      // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)
-      const double more = std::sqrt(std::max(1.0, one.distance / std::max(known.chance.distance, 1e-12)));
-      const bool may_be_it = k == best || probability[k] > 0.5 * (1 - settings_.sure);  // also for what others say
-      const Eigen::VectorXd deviation =
-          may_be_it ? Eigen::VectorXd(more * deviations(points[k], candidates[k].path.views(), known))
-                    : Eigen::VectorXd::Constant(points[k].size(), std::numeric_limits<double>::quiet_NaN());
-      for (std::size_t part = 0; part < points[k].effects(); ++part) {
-        const AppliedEffect applied = points[k].applied(part);
-        const auto [begin, count] = points[k].strength_of(part);
-        const std::size_t judged = part < found.size() ? found[part].judged : candidates[k].judged;
-        one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
-                               applied.window, one.distance, one.share});
-      }
-      refined.push_back(std::move(one));
+    for (std::size_t k = 0; k < reached.size(); ++k) {
+      const double share = share_of_reducible(before, reached[k].left.value, known.chance.distance, least);
+      const bool may_be_it = k == 0 || probability[k] > 0.5 * (1 - settings_.sure);  // also for what others say
+      refined.push_back(described(reached[k], share, may_be_it, known, found));
     }
-    std::stable_sort(refined.begin(), refined.end(),
-                     [](const auto& a, const auto& b) { return a.evidence.value > b.evidence.value; });
     return refined;
   }
 
@@ -144,6 +91,14 @@ class EffectRefiner {
   struct Candidate {
     std::size_t judged = 0;  ///< its number in the Judgement
     RefinementPath path;
+  };
+
+  /// Where a candidate got to.
+  struct Reached {
+    const Candidate* candidate = nullptr;
+    EffectPoint point{};
+    DistanceLeft left{};
+    Evidence evidence{};
   };
 
   /// A run with an effect, and what is left with it.
@@ -351,6 +306,21 @@ class EffectRefiner {
     }
   }
 
+  /// All of them towards where they explain most, fewer of them in each round.
+  void move(std::vector<Candidate>& candidates, const ComparedRecordings& known) {
+    const int most = std::max(settings_.refinement_rounds, settings_.last_refinement_rounds);
+    for (int round = 0; round < most && !candidates.empty(); ++round) {
+      if (round >= settings_.refinement_rounds) {
+        settle_others(candidates);
+      }
+      // none that distances are measured with
+      step_all(candidates, known, static_cast<std::uint32_t>((round < 3 ? 5001 : 10001) + 1000 * round));
+      if (round + 1 < settings_.refinement_rounds) {
+        keep_promising(candidates, known.chance);
+      }
+    }
+  }
+
   /// One step for each of the candidates that is not settled, all runs side by side. A point at which runs fail stays.
   void step_all(std::vector<Candidate>& candidates, const ComparedRecordings& known, std::uint32_t seed) {
     std::vector<Run> runs;
@@ -437,6 +407,71 @@ class EffectRefiner {
       view.above.col(k) = *above;
     }
     return view;
+  }
+
+  static Reached reached_at(EffectPoint point, const DistanceLeft& left, const Candidate& by,
+                            const ChanceLevel& chance) {
+    Evidence evidence = evidence_of(left.value, left.deviation, chance);
+    evidence.value -= static_cast<double>(point.size());
+    return {&by, std::move(point), left, evidence};
+  }
+
+  /// Without those for which runs fail there; by evidence, the best one first. @param candidates have to outlive it.
+  /// @param times see distances
+  std::vector<Reached> reached_by(const std::vector<Candidate>& candidates, const ComparedRecordings& known,
+                                  int times) {
+    std::vector<EffectPoint> points;
+    for (const Candidate& each : candidates) {
+      points.push_back(each.path.point());
+    }
+    const std::vector<DistanceLeft> left = distances(points, known, times);
+    std::vector<Reached> reached;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      if (std::isfinite(left[k].value)) {
+        reached.push_back(reached_at(points[k], left[k], candidates[k], known.chance));
+      }
+    }
+    std::stable_sort(reached.begin(), reached.end(),
+                     [](const Reached& a, const Reached& b) { return a.evidence.value > b.evidence.value; });
+    if (!reached.empty()) {
+      take_back_last_step(reached.front(), known, times);
+    }
+    return reached;
+  }
+
+  /// Nobody has checked the last step; where it led away, the point before it is taken.
+  void take_back_last_step(Reached& best, const ComparedRecordings& known, int times) {
+    const RefinementPath& path = best.candidate->path;
+    const auto leaves_less = [&](double distance) {
+      return relative_fall(best.left.value, distance) > known.chance.fall;
+    };
+    if (leaves_less(path.least_distance())) {
+      const DistanceLeft there = distances({path.nearest()}, known, times).front();
+      if (leaves_less(there.value)) {
+        best = reached_at(path.nearest(), there, *best.candidate, known.chance);
+      }
+    }
+  }
+
+  /// @param with_deviations how well strengths are known, which takes runs.
+  RefinedTogether described(const Reached& reached, double share, bool with_deviations, const ComparedRecordings& known,
+                            const std::vector<RefinedEffect>& found) {
+    const EffectPoint& point = reached.point;
+    Eigen::VectorXd deviation = Eigen::VectorXd::Constant(point.size(), std::numeric_limits<double>::quiet_NaN());
+    if (with_deviations) {
+      // where more is left than chance leaves, estimates are off by more as well (Birge, Phys. Rev. 40, 1932)
+      const double more = std::sqrt(std::max(1.0, reached.left.value / std::max(known.chance.distance, 1e-12)));
+      deviation = more * deviations(point, reached.candidate->path.views(), known);
+    }
+    RefinedTogether one{{}, reached.left.value, share, reached.left.deviation, reached.evidence};
+    for (std::size_t part = 0; part < point.effects(); ++part) {
+      const AppliedEffect applied = point.applied(part);
+      const auto [begin, count] = point.strength_of(part);
+      const std::size_t judged = part < found.size() ? found[part].judged : reached.candidate->judged;
+      one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
+                             applied.window, one.distance, one.share});
+    }
+    return one;
   }
 
   /// Standard deviation of each number of a point: what would be found in recordings of it in which all that is

@@ -102,76 +102,36 @@ class MissingEffectSearch {
     for (int round = 0; round < settings_.most_effects; ++round) {
       ComparedRecordings known = compare(
           learn_, effects(), round == 0 ? settings_.dictionary : settings_.next_dictionary, applied(result.found));
-      Judgement judgement = judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
-      if (round == 0) {
-        result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
-        for (const RecordedEvidence& each : known.recorded) {
-          const Eigen::VectorXd off = beyond_chance(each);
-          const ObservationFeatures& features = each.features();
-          result.where.push_back(
-              find_disagreements(features.silhouettes(), features.of_silhouettes(off), settings_.threshold));
-          result.where_read.push_back(
-              find_disagreements(features.readings(), features.of_readings(off), settings_.threshold));
-        }
-        const std::vector<double>& shares = settings_.dictionary.shares;
-        result.smallest_seen =
-            smallest_seen(effects(), known.recorded, known.chance, *std::min_element(shares.begin(), shares.end()));
-        if (judgement.has_gap() && compare.locate(learn_, result.where, known)) {
-          judgement = judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
-        }
-        result.judgement = judgement;
-        result.judged = known.effects;
-        result.taught_by = known.recorded.front().references();
-        for (const RecordedEvidence& each : known.recorded) {
-          result.taught_by = std::min(result.taught_by, each.references());
-        }
-      }
+      const Judgement judgement = round == 0 ? first_judgement(known, compare, result) : judged(known);
       if (judgement.verdict == Verdict::Nothing) {
         break;
       }
       const std::vector<RefinedTogether> refined = refine.best(judgement, known, result.found, result.learn.before);
-      const bool gains =
-          !refined.empty() && relative_fall(result.learn.after, refined.front().distance) > known.chance.fall;
-      // the more effects, the more of what nothing in the catalogue explains they can take over
-      const double together = round + 1;
-      const double least = 1 - (1 - settings_.least_share) / together;
-      const bool leaves_little =
-          !refined.empty() && refined.front().distance <= settings_.most_left * known.chance.largest_distance;
-      // Where all that is left may be chance, as far as few runs tell, nothing is left to explain, whatever its share:
-      // what reality is off by where nothing is missing may be more than the model's own runs are.
-      const bool faint = result.judgement.is_faint();
-      const bool down_to_chance = !refined.empty() && refined.front().distance - refined.front().distance_deviation <=
-                                                          known.chance.largest_distance;
-      const bool explains = leaves_little && (down_to_chance || refined.front().share >= least);
-      if (round == 0) {
-        // what effects explain by curves through few runs, and do not in runs with them, is no gap
-        gap_stands = !faint || gains;
-        std::vector<Evidence> evidence;
-        for (const RefinedTogether& each : refined) {
-          result.refined.push_back(each.effects.front());
-          evidence.push_back(each.evidence);
-        }
-        set_probabilities(result.refined, evidence);
-      }
-      // beside others, what may be tolerated as well is not what is missing
-      const bool stands_out =
-          gains && (round == 0 || is_beyond_tolerance(refined.front().effects.back(),
-                                                      effects()[refined.front().effects.back().effect]));
-      if (!stands_out || (!stages.empty() && stages.back().explains && !explains)) {  // what was found before stands
+      // what effects explain by curves through few runs, and do not in runs with them, is no gap
+      gap_stands = gap_stands || !result.judgement.is_faint();
+      if (refined.empty()) {
         break;
       }
-      result.found = refined.front().effects;
+      const RefinedTogether& best = refined.front();
+      const bool gains = relative_fall(result.learn.after, best.distance) > known.chance.fall;
+      gap_stands = gap_stands || gains;
       if (round == 0) {
-        result.found = {result.refined.front()};  // with its probability
+        keep_refined(refined, result);
       }
-      result.learn.after = refined.front().distance;
-      stages.push_back({result.found, result.learn.after, explains});
-      if (round == 0 && explains) {
+      // beside others, what may be tolerated as well is not what is missing
+      const RefinedEffect& added = best.effects.back();
+      const bool stands_out = gains && (round == 0 || is_beyond_tolerance(added, effects()[added.effect]));
+      const Explanation explanation = explained_by(best, known.chance);
+      if (!stands_out || (!stages.empty() && stages.back().explains && !explanation.explains)) {
+        break;  // what was found before stands
+      }
+      result.found = round == 0 ? std::vector{result.refined.front()} : best.effects;  // with its probability
+      result.learn.after = best.distance;
+      stages.push_back({result.found, result.learn.after, explanation.explains});
+      if (round == 0 && explanation.explains) {
         result.one_of = undecided(result.refined, known.chance, result.learn.before);
       }
-      if (down_to_chance || result.one_of.size() > 1 ||
-          (leaves_little && refined.front().share >= settings_.enough_share) ||
-          !is_promising(refined.front().share, together)) {
+      if (explanation.is_enough || result.one_of.size() > 1 || !is_promising(best)) {
         break;
       }
     }
@@ -205,12 +165,72 @@ class MissingEffectSearch {
     bool explains;  ///< enough of them
   };
 
+  /// How much of a gap effects explain.
+  struct Explanation {
+    bool explains;   ///< enough to be the answer
+    bool is_enough;  ///< so much that no further one is looked for
+  };
+
   static std::vector<AppliedEffect> applied(const std::vector<RefinedEffect>& effects) {
     std::vector<AppliedEffect> result;
     for (const RefinedEffect& each : effects) {
       result.push_back(each.applied());
     }
     return result;
+  }
+
+  Judgement judged(const ComparedRecordings& known) const {
+    return judge_effects(known.effects, known.evidence, known.chance, settings_.judgement);
+  }
+
+  /// Of recordings as they are beside the model as it is. Notes in `result` where they disagree, and what would have
+  /// been seen; effects are tried there as well, and added to what is known.
+  Judgement first_judgement(ComparedRecordings& known, RecordingComparison<Model>& compare,
+                            MissingEffect& result) const {
+    Judgement judgement = judged(known);
+    result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
+    for (const RecordedEvidence& each : known.recorded) {
+      const Eigen::VectorXd off = beyond_chance(each);
+      const ObservationFeatures& features = each.features();
+      result.where.push_back(
+          find_disagreements(features.silhouettes(), features.of_silhouettes(off), settings_.threshold));
+      result.where_read.push_back(
+          find_disagreements(features.readings(), features.of_readings(off), settings_.threshold));
+    }
+    const std::vector<double>& shares = settings_.dictionary.shares;
+    result.smallest_seen =
+        smallest_seen(effects(), known.recorded, known.chance, *std::min_element(shares.begin(), shares.end()));
+    if (judgement.has_gap() && compare.locate(learn_, result.where, known)) {
+      judgement = judged(known);
+    }
+    result.judgement = judgement;
+    result.judged = known.effects;
+    result.taught_by = known.recorded.front().references();
+    for (const RecordedEvidence& each : known.recorded) {
+      result.taught_by = std::min(result.taught_by, each.references());
+    }
+    return judgement;
+  }
+
+  /// Of the first round, each with its probability.
+  void keep_refined(const std::vector<RefinedTogether>& refined, MissingEffect& result) const {
+    std::vector<Evidence> evidence;
+    for (const RefinedTogether& each : refined) {
+      result.refined.push_back(each.effects.front());
+      evidence.push_back(each.evidence);
+    }
+    set_probabilities(result.refined, evidence);
+  }
+
+  /// The more effects, the more of what nothing in the catalogue explains they can take over. Where all that is left
+  /// may be chance, as far as few runs tell, nothing is left to explain, whatever its share: what reality is off by
+  /// where nothing is missing may be more than the model's own runs are.
+  Explanation explained_by(const RefinedTogether& effects, const ChanceLevel& chance) const {
+    const double least = 1 - (1 - settings_.least_share) / static_cast<double>(effects.effects.size());
+    const bool leaves_little = effects.distance <= settings_.most_left * chance.largest_distance;
+    const bool down_to_chance = effects.distance - effects.distance_deviation <= chance.largest_distance;
+    return {leaves_little && (down_to_chance || effects.share >= least),
+            down_to_chance || (leaves_little && effects.share >= settings_.enough_share)};
   }
 
   /// Deviations of the recording, each over what draws have there.
@@ -265,8 +285,9 @@ class MissingEffectSearch {
 
   /// Whether it may pay to look for one more. Of effects that are all as strong, n of n + 1 explain that share; the
   /// strongest are found first.
-  bool is_promising(double share, double effects) const {
-    return share >= settings_.promising_factor * effects / (effects + 1);
+  bool is_promising(const RefinedTogether& found) const {
+    const auto count = static_cast<double>(found.effects.size());
+    return found.share >= settings_.promising_factor * count / (count + 1);
   }
 
   /// An effect that was added to others has to explain some of what was not learnt from, too: what the first ones leave
