@@ -53,9 +53,10 @@ class EffectRefiner {
       : runs_(&runs), settings_(settings), of_(&of) {}
 
   /// The best of different answers, each refined together with what was found before; by evidence, the best first.
-  /// @param before the distance to the model without any.
+  /// How well strengths are known takes runs, and is not asked where even the best one gains no more than by chance.
+  /// @param before the distance to the model without any. @param after with what was found before.
   std::vector<RefinedTogether> best(const Judgement& judgement, const ComparedRecordings& known,
-                                    const std::vector<RefinedEffect>& found, double before) {
+                                    const std::vector<RefinedEffect>& found, double before, double after) {
     std::vector<Candidate> candidates = chosen(judgement, known, found);
     add_beats(candidates, known, found);
     move(candidates, known);
@@ -68,11 +69,12 @@ class EffectRefiner {
       least = std::min(least, each.left.value);
     }
     const std::vector<double> probability = reached.empty() ? std::vector<double>() : probabilities(evidence);
+    const bool gains = !reached.empty() && relative_fall(after, reached.front().left.value) > known.chance.fall;
     std::vector<RefinedTogether> refined;
     for (std::size_t k = 0; k < reached.size(); ++k) {
       const double share = share_of_reducible(before, reached[k].left.value, known.chance.distance, least);
       const bool may_be_it = k == 0 || probability[k] > 0.5 * (1 - settings_.sure);  // also for what others say
-      refined.push_back(described(reached[k], share, may_be_it, known, found));
+      refined.push_back(described(reached[k], share, gains && may_be_it, known, found));
     }
     return refined;
   }

@@ -106,7 +106,8 @@ class MissingEffectSearch {
       if (judgement.verdict == Verdict::Nothing) {
         break;
       }
-      const std::vector<RefinedTogether> refined = refine.best(judgement, known, result.found, result.learn.before);
+      const std::vector<RefinedTogether> refined =
+          refine.best(judgement, known, result.found, result.learn.before, result.learn.after);
       // what effects explain by curves through few runs, and do not in runs with them, is no gap
       gap_stands = gap_stands || !result.judgement.is_faint();
       if (refined.empty()) {
