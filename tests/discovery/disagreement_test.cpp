@@ -69,7 +69,7 @@ TEST_CASE("disagreement: what touches in space and time is one, with where it be
   const Disagreement& stream = found[1];
   CHECK(stream.unexpected);
   CHECK(stream.camera == 0);
-  CHECK(stream.squares == 4);
+  CHECK(stream.squares.size() == 4);
   CHECK(stream.weight == Approx(36 + 144 + 100 + 25));
   CHECK(stream.largest == Approx(12));
   CHECK(stream.box == PixelBox{40, 10, 80, 40});
@@ -96,17 +96,51 @@ TEST_CASE("disagreement: what begins small belongs to it, and much that is small
   }
   std::vector<Disagreement> found = find_disagreements(features, off);
   REQUIRE(found.size() == 1);
-  CHECK(found[0].squares == 2);
+  CHECK(found[0].squares.size() == 2);
   CHECK(found[0].begin == Approx(2.2));
   CHECK(found[0].onset_u == Approx(14.5));
   set(0, 5, 7, 3.01);
   found = find_disagreements(features, off);
   REQUIRE(found.size() == 2);
-  CHECK(found[0].squares == 4);
+  CHECK(found[0].squares.size() == 4);
   CHECK(found[0].begin == Approx(2));
   CHECK(found[0].onset_u == Approx((3.9 * 84.5 + 3.01 * 74.5) / 6.91));
   set(0, 5, 7, 2.99);
   CHECK(find_disagreements(features, off).size() == 1);
+}
+
+TEST_CASE("disagreement: each keeps its squares, and the earliest is none of a single one") {
+  const SilhouetteFeatures features = features_everywhere();
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features.size()));
+  const auto set = [&](int window, int row, int column, double value) {
+    off[static_cast<Eigen::Index>(feature_at(features, 0, window, row, column))] = value;
+  };
+  set(0, 6, 8, 9);   // alone, and first
+  set(1, 2, 2, -5);  // missing
+  set(2, 2, 3, -6);
+  set(2, 5, 5, 5);
+  set(3, 5, 6, 7);
+  const std::vector<Disagreement> found = find_disagreements(features, off);
+  REQUIRE(found.size() == 3);
+  const Disagreement* first = earliest(found);
+  REQUIRE(first != nullptr);
+  CHECK(!first->unexpected);
+  CHECK(first->begin == Approx(2.1));
+  REQUIRE(first->squares.size() == 2);
+  const bool in_order = first->squares[0].begin < first->squares[1].begin;
+  const DisagreeingSquare &begins = first->squares[in_order ? 0 : 1], &ends = first->squares[in_order ? 1 : 0];
+  CHECK(begins.box == PixelBox{20, 20, 30, 30});
+  CHECK(begins.off == Approx(5));
+  CHECK(begins.begin == Approx(2.1));
+  CHECK(ends.box == PixelBox{30, 20, 40, 30});
+  CHECK(ends.off == Approx(6));
+  CHECK(ends.end == Approx(2.2));
+  const Disagreement* more = earliest(found, true);
+  REQUIRE(more != nullptr);
+  CHECK(more->begin == Approx(2.2));
+  off.setZero();
+  set(0, 6, 8, 9);
+  CHECK(earliest(find_disagreements(features, off)) == nullptr);
 }
 
 TEST_CASE("disagreement: nothing beyond the threshold is nothing, and arguments are checked") {
@@ -115,7 +149,7 @@ TEST_CASE("disagreement: nothing beyond the threshold is nothing, and arguments 
   CHECK(find_disagreements(features, off).empty());
   const std::vector<Disagreement> all = find_disagreements(features, off, 2);
   REQUIRE(all.size() == 2);  // all of the picture, of each camera
-  CHECK(all[0].squares == 400);
+  CHECK(all[0].squares.size() == 400);
   CHECK_THROWS_WITH(find_disagreements(features, off.head(3)), decant_test::contains("as many as features"));
   CHECK_THROWS_WITH(find_disagreements(features, off, 0), decant_test::contains("threshold must be > 0"));
 }

@@ -17,6 +17,7 @@
 #include <decant/boundary/pipe_section.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/camera/pinhole_camera.hpp>
+#include <decant/discovery/disagreement_place.hpp>
 #include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
 #include <decant/simulation/fill.hpp>
@@ -189,6 +190,78 @@ TEST_CASE("simulated interaction: errors of a camera change its picture alone") 
   // a turn of the picture about its middle by a quarter takes what is above it to the right
   const auto turned = pour.predict(run_with(pour, "camera_roll", {1.5707963})).silhouettes;
   CHECK(apart(plain[0], turned[0]) > wet_area(plain[0]));
+}
+
+TEST_CASE("disagreement place: a pixel shows what is as far off as liquid there, and the nearest body is named") {
+  SimulatorSettings settings;
+  settings.spacing = 0.01;
+  settings.threads = {1};
+  PourModel model(settings);
+  model.add_body("block", Box{{-0.05, -0.05, -0.02}, {0.05, 0.05, 0}});
+  // turned by a quarter: from x = 0.2 on, up to z = 0.2
+  const Pose upright{Eigen::Quaterniond(Eigen::AngleAxisd(-0.5 * std::numbers::pi, Eigen::Vector3d::UnitY())),
+                     {0.21, 0, 0}};
+  model.add_body("post", Box{{-0.02, -0.01, -0.01}, {0.2, 0.01, 0.01}}, PoseTrack(upright));
+  const Eigen::Matrix3d axes = (Eigen::Matrix3d() << 1, 0, 0, 0, 0, -1, 0, 1, 0).finished();  // looks along +y
+  const Pose camera_from_world{Eigen::Quaterniond(axes), {0, 0.1, 0.5}};
+  const PinholeCamera camera(300, 300, 159.5, 119.5, 320, 240);
+  const auto seen_at = [&](const Eigen::Vector2d& pixel) {
+    return place_of_liquid(model, camera, camera_from_world, pixel);
+  };
+  const auto pixel_of = [&](const Vector3<double>& x) { return camera.project(camera_from_world * x).pixel; };
+  CHECK(!seen_at({160, 120}));  // there is no liquid
+
+  const Vector3<double> front(0, 0, 0.05), aside(0.15, 0.02, 0.1);
+  PointArray<float> places(3, 4);
+  places.col(0) = (front + 0.2 * (front - camera_from_world.inverse().translation)).cast<float>();  // hidden by it
+  places.col(1) = front.cast<float>();
+  places.col(2) = aside.cast<float>();
+  places.col(3) = Vector3<float>(0.2F, -0.8F, 0.1F);  // behind the camera
+  model.add_particles(places, PointArray<float>::Zero(3, 4), 0);
+  const auto above = seen_at(pixel_of(front)), beside = seen_at(pixel_of(aside));
+  REQUIRE((above && beside));
+  CHECK((above->place - front).norm() < 1e-6);
+  CHECK(above->body == 0);
+  CHECK(above->distance == Approx(0.05).epsilon(1e-4));
+  CHECK((beside->place - aside).norm() < 1e-6);
+  CHECK(beside->body == 1);
+  CHECK(beside->distance == Approx(std::hypot(0.05, 0.01)).epsilon(1e-4));  // of its edge
+  // Where no liquid is, it would be as far off as the nearest that is seen: what comes out of it is not far.
+  const Eigen::Vector2d other = pixel_of(aside) + Eigen::Vector2d(10, 0);
+  const auto out = seen_at(other);
+  REQUIRE(out);
+  CHECK((pixel_of(out->place) - other).norm() < 1e-6);
+  CHECK((out->place - aside).norm() < 0.02);
+  CHECK(!seen_at({std::nan(""), 120}));
+}
+
+TEST_CASE("disagreement place: it is told where liquid is in the world when a disagreement begins") {
+  const Pour pour = pour_of();
+  const auto& camera = pour.scene().cameras.front();
+  Vector3<double> in_cup, in_pan;
+  pour.watch({}, [&](std::size_t frame, const PourModel& model, auto&&...) {
+    (frame == 0 ? in_cup : in_pan) = model.fluid().position.rowwise().mean().cast<double>();
+  });
+  const auto begins = [&](double time, const Vector3<double>& where) {
+    Disagreement one;
+    one.begin = time;
+    const Eigen::Vector2d pixel = camera.camera.project(camera.camera_from_world.front() * where).pixel;
+    one.onset_u = pixel.x();
+    one.onset_v = pixel.y();
+    return one;
+  };
+  Disagreement of_none = begins(0.3, in_pan);
+  of_none.camera = 1;
+  const auto places = places_of({begins(pour_seconds, in_pan), of_none, begins(0, in_cup)}, pour);
+  REQUIRE(places.size() == 3);
+  REQUIRE((places[0] && places[2]));
+  CHECK(places[0]->body == 1);
+  CHECK((places[0]->place - in_pan).head<2>().norm() < 0.08);  // the pan's radius
+  CHECK(places[0]->distance < 0.02);
+  CHECK(places[2]->body == 0);
+  CHECK((places[2]->place - in_cup).norm() < 0.03);  // the cup's
+  CHECK(!places[1]);
+  CHECK(places_of({}, pour).empty());
 }
 
 TEST_CASE("simulated interaction: effects reach the model, and amounts are what is asked for") {

@@ -35,17 +35,24 @@ inline void check_deviations(std::size_t features, const Eigen::VectorXd& off, d
 
 }  // namespace detail
 
+/// A square of the picture over a window of time.
+struct DisagreeingSquare {
+  PixelBox box{};             ///< which may reach beyond the image's border [px]
+  double begin = 0, end = 0;  ///< of the window's frames [s]
+  double off = 0;             ///< from what is expected, > 0, counted in what differs anyway
+};
+
 /// Squares of the picture that touch each other in space and time, in all of which there is more liquid than expected,
 /// or less. Where it begins points at the cause; where most of it is, at the consequence.
 struct Disagreement {
   std::size_t camera = 0;
-  bool unexpected = true;           ///< liquid where none is expected; false: none where it is
-  PixelBox box{};                   ///< of all its squares [px]
-  double begin = 0, end = 0;        ///< of its frames [s]
-  double onset_u = 0, onset_v = 0;  ///< middle of what it begins with [px]
-  double weight = 0;                ///< sum of squares, each counted in what differs anyway
-  double largest = 0;               ///< of the squares, counted in what differs anyway
-  std::size_t squares = 0;          ///< over all windows of time
+  bool unexpected = true;                    ///< liquid where none is expected; false: none where it is
+  PixelBox box{};                            ///< of all its squares [px]
+  double begin = 0, end = 0;                 ///< of its frames [s]
+  double onset_u = 0, onset_v = 0;           ///< middle of what it begins with [px]
+  double weight = 0;                         ///< sum of the squares of what its squares are off by
+  double largest = 0;                        ///< of what they are off by
+  std::vector<DisagreeingSquare> squares{};  ///< over all windows of time
 };
 
 /// @param features where and when they are.
@@ -88,11 +95,11 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     one.unexpected = is_more(component.front().second);
     one.begin = any.begin;
     one.end = any.end;
-    one.squares = component.size();
     int first_window = any.window;
     for (const auto& [key, feature] : component) {
       const SilhouetteFeatures::Place& place = features.place(feature);
       const double size = std::abs(off[static_cast<Eigen::Index>(feature)]);
+      one.squares.push_back({place.box, place.begin, place.end, size});
       one.box = one.box.hull(place.box);
       one.begin = std::min(one.begin, place.begin);
       one.end = std::max(one.end, place.end);
@@ -113,12 +120,25 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     }
     one.onset_u /= total;
     one.onset_v /= total;
-    if (one.largest > threshold || one.squares >= detail::many_together) {
+    if (one.largest > threshold || one.squares.size() >= detail::many_together) {
       found.push_back(one);
     }
   }
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.weight > b.weight; });
   return found;
+}
+
+/// The earliest of disagreements; a single square is easily chance. Nothing if there is none.
+/// @param only_unexpected of those of too much liquid.
+inline const Disagreement* earliest(const std::vector<Disagreement>& of, bool only_unexpected = false) noexcept {
+  const Disagreement* first = nullptr;
+  for (const Disagreement& each : of) {
+    const bool counts = (each.unexpected || !only_unexpected) && each.squares.size() > 1;
+    if (counts && (first == nullptr || each.begin < first->begin)) {
+      first = &each;
+    }
+  }
+  return first;
 }
 
 /// A sensor that for a while reads more than expected, or less.

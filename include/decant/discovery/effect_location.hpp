@@ -26,18 +26,6 @@ namespace detail {
 /// How long it may take until something is seen of an effect [s].
 inline constexpr double latest_sight = 0.3;
 
-/// The earliest of disagreements; a single square is easily chance. Nothing if there is none.
-inline const Disagreement* earliest(const std::vector<Disagreement>& of, bool only_unexpected) noexcept {
-  const Disagreement* first = nullptr;
-  for (const Disagreement& each : of) {
-    const bool counts = (each.unexpected || !only_unexpected) && each.squares > 1;
-    if (counts && (first == nullptr || each.begin < first->begin)) {
-      first = &each;
-    }
-  }
-  return first;
-}
-
 }  // namespace detail
 
 /// Effects at the places, and from the times on, where recordings say that they are, without strengths. Of each name
@@ -61,7 +49,7 @@ std::vector<AppliedEffect> located_effects(const std::vector<const Model*>& mode
     const Disagreement* onset = nullptr;
     std::size_t recording = 0;
     for (; recording < where.size(); ++recording) {
-      onset = detail::earliest(where[recording], effect.seen_first != SeenFirst::Either);
+      onset = earliest(where[recording], effect.seen_first != SeenFirst::Either);
       if (onset != nullptr) {
         break;
       }
