@@ -181,14 +181,6 @@ int main(int count, char** values) {
       advice = decant::advise_next_interaction(possible, std::move(proposed), result.learn, run_jobs, settings);
     }
     progress.finish();
-    std::printf("%s\n%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
-                example::references_sentence(reference_folders.size(), result).c_str(),
-                example::gap_table(result).text().c_str(), example::where_table(learn_folders, result).text().c_str(),
-                example::candidates_table(result.judged, result).text().c_str());
-    if (!proposed_folders.empty()) {
-      std::printf("%s", possible.size() < 2 ? "Nothing is left for a further recording to tell apart.\n"
-                                            : example::advice_table(proposed_folders, advice).text().c_str());
-    }
     std::vector<const example::RecordedInteraction*> interactions;
     std::vector<std::vector<std::string>> sensors;
     for (std::size_t k = 0; k < learn_folders.size() + held_out_folders.size(); ++k) {
@@ -197,11 +189,22 @@ int main(int count, char** values) {
     }
     const bool read = std::any_of(sensors.begin(), sensors.end(), [](const auto& each) { return !each.empty(); });
     std::vector<example::ComparedModel> models;
+    example::NamedPlaces places;
     example::in_first_process(executor, [&] {
       if (read || !report_file.empty()) {
         models = example::compared_models(interactions, result);
       }
+      places = example::named_places(interactions, result);
     });
+    std::printf("%s\n%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
+                example::references_sentence(reference_folders.size(), result).c_str(),
+                example::gap_table(result).text().c_str(),
+                example::where_table(learn_folders, result, places).text().c_str(),
+                example::candidates_table(result.judged, result).text().c_str());
+    if (!proposed_folders.empty()) {
+      std::printf("%s", possible.size() < 2 ? "Nothing is left for a further recording to tell apart.\n"
+                                            : example::advice_table(proposed_folders, advice).text().c_str());
+    }
     if (read) {
       std::printf("%s%s", example::where_read_table(learn_folders, sensors, result).text().c_str(),
                   example::readings_table(models, interactions).text().c_str());
@@ -216,13 +219,15 @@ int main(int count, char** values) {
         json["seconds"] = 1e-3 * milliseconds;
         json["spacing_mm"] = model_mm;
         json["references"] = reference_folders.size();
+        json["where"] = example::where_json(learn_folders, result, places);
+        json["diffuse"] = example::is_diffuse(result);
         json["readings"] = example::readings_json(models, interactions);
         json["advice"] = example::advice_json(proposed_folders, advice);
         example::write_result(json_file, json);
       }
       if (!report_file.empty()) {
         example::write_missing_effect_report(report_file, interactions, learn_folders.size(), models, result,
-                                             reference_folders.size());
+                                             reference_folders.size(), places);
       }
     });
     return 0;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -15,6 +16,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include <decant/discovery/disagreement.hpp>
+#include <decant/discovery/disagreement_place.hpp>
 #include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/missing_effect.hpp>
 #include <decant/discovery/next_interaction.hpp>
@@ -202,6 +205,25 @@ inline std::string references_sentence(std::size_t references, const decant::Mis
                    "what it is off by.";
 }
 
+namespace detail {
+
+/// Of all recordings, or the heaviest one if there are single squares alone. Nothing if there is none.
+inline const decant::Disagreement* earliest_of_all(const std::vector<std::vector<decant::Disagreement>>& where) {
+  const decant::Disagreement *first = nullptr, *heaviest = nullptr;
+  for (const auto& recording : where) {
+    const decant::Disagreement* one = decant::earliest(recording);
+    if (one != nullptr && (first == nullptr || one->begin < first->begin)) {
+      first = one;
+    }
+    if (!recording.empty() && (heaviest == nullptr || recording.front().weight > heaviest->weight)) {
+      heaviest = &recording.front();
+    }
+  }
+  return first != nullptr ? first : heaviest;
+}
+
+}  // namespace detail
+
 /// @param gravity of the recordings [m/s^2].
 inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& effects,
                                           const decant::MissingEffect& result, const decant::Vector3<double>& gravity) {
@@ -248,14 +270,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                                      {"below", number_json(each.below)},
                                      {"above", number_json(each.above)}});
   }
-  const decant::Disagreement* earliest = nullptr;
-  for (const auto& recording : result.where) {
-    for (const decant::Disagreement& each : recording) {
-      if (earliest == nullptr || each.begin < earliest->begin) {
-        earliest = &each;
-      }
-    }
-  }
+  const decant::Disagreement* earliest = detail::earliest_of_all(result.where);
   double first_read = std::numeric_limits<double>::infinity();
   for (const auto& recording : result.where_read) {
     for (const decant::ReadingDisagreement& each : recording) {
@@ -371,23 +386,82 @@ inline decant::Table where_read_table(const std::vector<std::string>& recordings
   return table;
 }
 
+/// Where in the world a disagreement begins.
+struct NamedPlace {
+  decant::SeenPlace seen;
+  std::string body;  ///< the nearest one's name
+};
+/// By recording and disagreement; as many of either as are known.
+using NamedPlaces = std::vector<std::vector<std::optional<NamedPlace>>>;
+
+namespace detail {
+
+inline const NamedPlace* place_at(const NamedPlaces& places, std::size_t recording, std::size_t which) {
+  const bool known = recording < places.size() && which < places[recording].size() && places[recording][which];
+  return known ? &*places[recording][which] : nullptr;
+}
+
+}  // namespace detail
+
 /// Disagreements, the heaviest first.
-inline decant::Table where_table(const std::vector<std::string>& recordings, const decant::MissingEffect& result) {
+inline decant::Table where_table(const std::vector<std::string>& recordings, const decant::MissingEffect& result,
+                                 const NamedPlaces& places) {
   using decant::detail::fixed_text;
-  decant::Table table({"recording", "camera", "liquid", "from [s]", "to [s]", "begins at u, v [px]", "u [px]", "v [px]",
-                       "largest, in what chance does"});
+  decant::Table table({"recording", "camera", "liquid", "from [s]", "to [s]", "begins at u, v [px]", "x, y, z [mm]",
+                       "near", "u [px]", "v [px]", "largest, in what chance does"});
   for (std::size_t which = 0; which < result.where.size(); ++which) {
     for (std::size_t k = 0; k < std::min<std::size_t>(8, result.where[which].size()); ++k) {
       const decant::Disagreement& each = result.where[which][k];
+      std::string at = "-", near = "-";
+      if (const NamedPlace* place = detail::place_at(places, which, k)) {
+        const decant::Vector3<double> mm = 1e3 * place->seen.place;
+        at = fixed_text(mm.x(), 0) + ", " + fixed_text(mm.y(), 0) + ", " + fixed_text(mm.z(), 0);
+        near = fixed_text(1e3 * place->seen.distance, 0) + " mm from the " + place->body;
+      }
       table.add({recordings.at(which), std::to_string(each.camera), each.unexpected ? "unexpected" : "missing",
                  fixed_text(each.begin, 2), fixed_text(each.end, 2),
-                 fixed_text(each.onset_u, 0) + ", " + fixed_text(each.onset_v, 0),
+                 fixed_text(each.onset_u, 0) + ", " + fixed_text(each.onset_v, 0), at, near,
                  std::to_string(each.box.u_begin) + " .. " + std::to_string(each.box.u_end),
                  std::to_string(each.box.v_begin) + " .. " + std::to_string(each.box.v_end),
                  fixed_text(each.largest, 1)});
     }
   }
   return table;
+}
+
+/// All of them.
+inline nlohmann::json where_json(const std::vector<std::string>& recordings, const decant::MissingEffect& result,
+                                 const NamedPlaces& places) {
+  nlohmann::json json = nlohmann::json::array();
+  for (std::size_t which = 0; which < result.where.size(); ++which) {
+    for (std::size_t k = 0; k < result.where[which].size(); ++k) {
+      const decant::Disagreement& each = result.where[which][k];
+      json.push_back({{"recording", recordings.at(which)},
+                      {"camera", each.camera},
+                      {"liquid", each.unexpected ? "unexpected" : "missing"},
+                      {"from_s", each.begin},
+                      {"to_s", each.end},
+                      {"onset_px", {each.onset_u, each.onset_v}},
+                      {"box_px", {each.box.u_begin, each.box.v_begin, each.box.u_end, each.box.v_end}},
+                      {"weight", number_json(each.weight)},
+                      {"largest", number_json(each.largest)}});
+      if (const NamedPlace* place = detail::place_at(places, which, k)) {
+        const decant::Vector3<double>& x = place->seen.place;
+        json.back()["place"] = {x.x(), x.y(), x.z()};
+        json.back()["near"] = place->body;
+        json.back()["distance_m"] = place->seen.distance;
+      }
+    }
+  }
+  return json;
+}
+
+/// Whether there is a gap that is nowhere in particular.
+inline bool is_diffuse(const decant::MissingEffect& result) {
+  const auto empty = [](const auto& of) {
+    return std::all_of(of.begin(), of.end(), [](const auto& each) { return each.empty(); });
+  };
+  return result.judgement.has_gap() && empty(result.where) && empty(result.where_read);
 }
 
 /// Throws std::runtime_error where a proposed interaction has another catalogue than what was learnt from: numbers of

@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include <decant/core/parallel.hpp>
+#include <decant/discovery/disagreement_place.hpp>
 #include <decant/discovery/missing_effect.hpp>
 #include <decant/io/report.hpp>
 #include <decant/io/table.hpp>
@@ -26,6 +27,7 @@
 #include "missing_effect_output.hpp"
 #include "overlay_pictures.hpp"
 #include "recorded_interaction.hpp"
+#include "where_map.hpp"
 
 namespace example {
 
@@ -102,6 +104,23 @@ inline std::vector<ComparedModel> compared_models(const std::vector<const Record
     models[model].views[which] = view_of_run(*interactions[which], {models[model].effects, 1, false});
   });
   return models;
+}
+
+/// Where disagreements of the recordings that were learnt from are, by a run of each one's model, on all cores.
+/// @param interactions those that were learnt from first.
+inline NamedPlaces named_places(const std::vector<const RecordedInteraction*>& interactions,
+                                const decant::MissingEffect& result) {
+  NamedPlaces places(result.where.size());
+  decant::parallel_jobs(static_cast<decant::Index>(places.size()), {0}, [&](decant::Index number) {
+    const auto which = static_cast<std::size_t>(number);
+    for (const auto& seen : decant::places_of(result.where[which], interactions[which]->model)) {
+      places[which].emplace_back();
+      if (seen && seen->body < interactions[which]->recording.bodies.size()) {
+        places[which].back() = NamedPlace{*seen, interactions[which]->recording.bodies[seen->body].name};
+      }
+    }
+  });
+  return places;
 }
 
 /// Root mean square of what a model reads too much or too little of; NaN where the recording has no reading.
@@ -208,6 +227,30 @@ inline decant::LineChart sensor_chart(const RecordedInteraction& first, std::siz
   return chart;
 }
 
+/// Where the first camera's picture is off, over all times, among the bodies as they are when the heaviest disagreement
+/// begins. Nothing is added where it is off nowhere.
+inline void add_where_map(decant::HtmlReport& report, const RecordedInteraction& of,
+                          const std::vector<decant::Disagreement>& where) {
+  const WhereMap map = where_map(where, of.recording.width, of.recording.height);
+  if (!map.begin) {
+    return;
+  }
+  std::size_t frame = 0;
+  for (const std::size_t each : of.frames) {
+    frame = of.recording.timestamps[each] <= *map.begin + 1e-9 ? each : frame;
+  }
+  decant::Recording seen_by_it = of.recording;
+  std::swap(seen_by_it.cameras.front(), seen_by_it.cameras[of.cameras.front()]);
+  const Region all{0, 0, of.recording.height, of.recording.width};
+  report.picture(where_picture(draw_bodies(seen_by_it, {frame}, all, {1}).front(), map),
+                 of.recording.name +
+                     ": amber is liquid that the model does not have, blue is where it has too much; "
+                     "the stronger, the farther beyond chance, all times together. The bodies are as "
+                     "they are at " +
+                     decant::detail::fixed_text(of.recording.timestamps[frame], 2) +
+                     " s, when the heaviest begins: where the ring is.");
+}
+
 /// Films and charts of the first recording.
 inline void add_first_recording(decant::HtmlReport& report, const RecordedInteraction& first,
                                 const std::vector<ComparedModel>& models) {
@@ -257,11 +300,11 @@ inline void add_first_recording(decant::HtmlReport& report, const RecordedIntera
 
 /// @param interactions those that were learnt from, the first one's films are shown, then those held out.
 /// @param learnt how many of them were learnt from. @param models of compared_models. @param references how many
-/// recordings there were in which nothing is missing.
+/// recordings there were in which nothing is missing. @param places of named_places.
 inline void write_missing_effect_report(const std::string& file,
                                         const std::vector<const RecordedInteraction*>& interactions, std::size_t learnt,
                                         const std::vector<ComparedModel>& models, const decant::MissingEffect& result,
-                                        std::size_t references) {
+                                        std::size_t references, const NamedPlaces& places) {
   const std::vector<decant::Effect>& effects = result.judged;
   decant::HtmlReport report("What the model lacks");
   report.paragraph(missing_effect_sentence(effects, result));
@@ -291,11 +334,17 @@ inline void write_missing_effect_report(const std::string& file,
   std::vector<std::string> names;
   for (std::size_t k = 0; k < learnt; ++k) {
     names.push_back(interactions[k]->recording.name);
+    detail::add_where_map(report, *interactions[k], result.where[k]);
   }
   const bool somewhere =
       std::any_of(result.where.begin(), result.where.end(), [](const auto& each) { return !each.empty(); });
   if (somewhere) {
-    report.table(where_table(names, result));
+    report.paragraph(
+        "How far off something is one camera does not say: places are as far off as the model's liquid is that is "
+        "seen nearest to them.");
+    report.table(where_table(names, result, places));
+  } else if (is_diffuse(result)) {
+    report.paragraph("The gap is diffuse: nothing is off by much anywhere, but much together.");
   } else if (!interactions.front()->cameras.empty()) {
     report.paragraph("Nowhere in particular: no part of the picture is off by much.");
   }

@@ -387,7 +387,7 @@ elseif(CASE STREQUAL "find_missing_effect_says_what_it_found")
   # coarse and short: that figures arrive where they should; how good they are is for other recordings
   record(--container cup --fill 0.9 --seed 3 --spacing-mm 8 --seconds 1.2 --nothing-hidden)
   run(0 --learn pour --spacing-mm 12 --draws 5 --json out.json --report out.html --journal runs.journal)
-  expect_keys("${SCRATCH}/out.json" verdict effect gap.before gap.after gap.noise candidates runs seconds)
+  expect_keys("${SCRATCH}/out.json" verdict effect gap.before gap.after gap.noise candidates runs seconds where diffuse)
   file(READ "${SCRATCH}/out.json" first)
   string(JSON verdict GET "${first}" verdict)
   if(NOT verdict MATCHES "^(nothing|named|one_of|unexplained)$")

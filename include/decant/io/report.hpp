@@ -444,7 +444,9 @@ class HtmlReport {
                             detail::bar_chart_svg(chart, detail::narrow_chart));
   }
 
-  void picture(const Picture& picture, const std::string& caption) {
+  /// @param picture a Picture or a PalettePicture.
+  template <class AnyPicture>
+  void picture(const AnyPicture& picture, const std::string& caption) {
     body_ += "<figure><img alt=\"" + detail::html_text(caption) + "\" src=\"data:image/png;base64," +
              detail::base64(png_bytes(picture)) + "\"><figcaption>" + detail::html_text(caption) +
              "</figcaption></figure>\n";
