@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <random>
 #include <set>
 #include <string>
 #include <tuple>
@@ -136,6 +137,26 @@ class Either {
  private:
   const LocatingJetModel* with_ = nullptr;
   const Backwards* without_ = nullptr;
+};
+
+/// Knows of drag, of poses that are late, and of a blend of both with a gust.
+class Blend {
+ public:
+  explicit Blend(const Jet& of_strength_1) : blend_(of_strength_1) { effects_.back().name = "blend"; }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(const ModelRun& run) const {
+    std::mt19937 random(run.seed + 77);
+    const std::vector<AppliedEffect> as = effects_of_run(effects_, run, random);
+    const double blend = as[2].strength[0];
+    return film_of({.drag = as[0].strength[0] + blend * blend_.drag,
+                    .late = as[1].strength[0] + blend * blend_.late,
+                    .gust = blend * blend_.gust},
+                   run.seed);
+  }
+
+ private:
+  Jet blend_;
+  std::vector<Effect> effects_{JetModel().effects()[0], JetModel().effects()[3], JetModel().effects()[0]};
 };
 
 /// Knows that there is no tap.
@@ -680,6 +701,27 @@ TEST_CASE("missing effect: two at once are found one after another") {
   CHECK(result.confirmation == Confirmation::Confirmed);
 }
 
+TEST_CASE("missing effect: what explains most alone may be none of two that explain more together") {
+  const Blend model({.drag = 0.48, .late = 0.1, .gust = -1.5});
+  const auto names = [&](int beam) {
+    MissingEffectSettings settings;
+    settings.beam = beam;
+    ThreadExecutor executor{{1}};
+    const MissingEffect result = MissingEffectSearch<Blend>({{"a", &model, film_of({.drag = 0.4, .late = 0.05}, 801)}},
+                                                            {}, run_jobs_on(executor), settings)
+                                     .find();
+    CHECK(result.verdict == Verdict::Named);
+    CHECK(model.effects()[result.refined.front().effect].name == "blend");
+    std::set<std::string> found;
+    for (const RefinedEffect& each : result.found) {
+      found.insert(model.effects()[each.effect].name);
+    }
+    return found;
+  };
+  CHECK(names(1).contains("blend"));  // beside which nothing else brings it to what is there
+  CHECK(names(2) == std::set<std::string>{"drag", "late"});
+}
+
 TEST_CASE("missing effect: a second one that may as well be what is tolerated is not named, however much it explains") {
   // Beside a pull there is a gust, which no effect is. Late poses, of which some are tolerated, explain much of it.
   const auto find = [](double pull, double late, std::uint32_t seed) {
@@ -799,6 +841,9 @@ TEST_CASE("missing effect: what is asked is checked") {
   settings = {};
   settings.enough_share = -1;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("enough_share"));
+  settings = {};
+  settings.beam = 0;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("beam"));
   settings = {};
   settings.sure = 1.5;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("sure"));

@@ -75,6 +75,7 @@ class MissingEffectSearch {
     expects(settings_.refined >= 1 && settings_.refinement_rounds >= 1 && settings_.refinement_seeds >= 1,
             "MissingEffectSettings: refined, refinement_rounds, refinement_seeds", ">= 1", settings_.refined);
     expects(settings_.most_effects >= 1, "MissingEffectSettings: most_effects", ">= 1", settings_.most_effects);
+    expects(settings_.beam >= 1, "MissingEffectSettings: beam", ">= 1", settings_.beam);
     expects(settings_.least_share >= 0 && settings_.least_share <= 1, "MissingEffectSettings: least_share", "0 .. 1",
             settings_.least_share);
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
@@ -99,42 +100,38 @@ class MissingEffectSearch {
     compare.consult_references();
     std::vector<Stage> stages;
     bool gap_stands = false;
+    std::vector<std::vector<RefinedEffect>> beam{{}};  // sets that further effects are looked for beside
     for (int round = 0; round < settings_.most_effects; ++round) {
-      ComparedRecordings known = compare(
-          learn_, effects(), round == 0 ? settings_.dictionary : settings_.next_dictionary, applied(result.found));
-      const Judgement judgement = round == 0 ? first_judgement(known, compare, result) : judged(known);
-      if (judgement.verdict == Verdict::Nothing) {
+      const std::optional<std::vector<Answer>> answers = answers_beside(beam, compare, refine, result);
+      if (!answers) {
         break;
       }
-      const std::vector<RefinedTogether> refined =
-          refine.best(judgement, known, result.found, result.learn.before, result.learn.after);
       // what effects explain by curves through few runs, and do not in runs with them, is no gap
       gap_stands = gap_stands || !result.judgement.is_faint();
-      if (refined.empty()) {
+      if (answers->empty()) {
         break;
       }
-      const RefinedTogether& best = refined.front();
-      const bool gains = relative_fall(result.learn.after, best.distance) > known.chance.fall;
+      const RefinedTogether& best = answers->front().effects;
+      const ChanceLevel& chance = answers->front().chance;
+      const bool gains = relative_fall(result.learn.after, best.distance) > chance.fall;
       gap_stands = gap_stands || gains;
       if (round == 0) {
-        keep_refined(refined, result);
+        keep_refined(*answers, result);
       }
-      // beside others, what may be tolerated as well is not what is missing
-      const RefinedEffect& added = best.effects.back();
-      const bool stands_out = gains && (round == 0 || is_beyond_tolerance(added, effects()[added.effect]));
-      const Explanation explanation = explained_by(best, known.chance);
-      if (!stands_out || (!stages.empty() && stages.back().explains && !explanation.explains)) {
+      const Explanation explanation = explained_by(best, chance);
+      if (!gains || (!stages.empty() && stages.back().explains && !explanation.explains)) {
         break;  // what was found before stands
       }
       result.found = round == 0 ? std::vector{result.refined.front()} : best.effects;  // with its probability
       result.learn.after = best.distance;
       stages.push_back({result.found, result.learn.after, explanation.explains});
       if (round == 0 && explanation.explains) {
-        result.one_of = undecided(result.refined, known.chance, result.learn.before);
+        result.one_of = undecided(result.refined, chance, result.learn.before);
       }
       if (explanation.is_enough || result.one_of.size() > 1 || !is_promising(best)) {
         break;
       }
+      beam = best_sets(*answers);
     }
     std::optional<ComparedRecordings> others;
     if (!held_out_.empty() && !stages.empty()) {
@@ -164,6 +161,12 @@ class MissingEffectSearch {
     std::vector<RefinedEffect> found;
     double after;   ///< what is left of the recordings learnt from
     bool explains;  ///< enough of them
+  };
+
+  /// Effects that may be what is missing, together, and what chance does beside those that were found before them.
+  struct Answer {
+    RefinedTogether effects;
+    ChanceLevel chance;
   };
 
   /// How much of a gap effects explain.
@@ -213,12 +216,70 @@ class MissingEffectSearch {
     return judgement;
   }
 
-  /// Of the first round, each with its probability.
-  void keep_refined(const std::vector<RefinedTogether>& refined, MissingEffect& result) const {
-    std::vector<Evidence> evidence;
+  /// The best effects beside each of some sets that were found before, the best first. Nothing where nothing is left to
+  /// explain beside the first of these. @param beam an empty set at first, with which `result` begins.
+  std::optional<std::vector<Answer>> answers_beside(const std::vector<std::vector<RefinedEffect>>& beam,
+                                                    RecordingComparison<Model>& compare, EffectRefiner<Model>& refine,
+                                                    MissingEffect& result) const {
+    std::vector<Answer> answers;
+    for (const std::vector<RefinedEffect>& found : beam) {
+      const bool is_first_round = found.empty();
+      ComparedRecordings known =
+          compare(learn_, effects(), is_first_round ? settings_.dictionary : settings_.next_dictionary, applied(found));
+      const Judgement judgement = is_first_round ? first_judgement(known, compare, result) : judged(known);
+      if (judgement.verdict != Verdict::Nothing) {
+        add(refine.best(judgement, known, found, result.learn.before, result.learn.after), known.chance, answers);
+      } else if (&found == &beam.front()) {
+        return std::nullopt;
+      }
+    }
+    return answers;
+  }
+
+  /// Adds what was refined beside one set, the best first, to what was beside others. Of several effects each has to be
+  /// stronger than what is tolerated: beside others, what may be tolerated as well is not what is missing.
+  void add(const std::vector<RefinedTogether>& refined, const ChanceLevel& chance, std::vector<Answer>& answers) const {
+    if (refined.empty() || (refined.front().effects.size() > 1 && !all_beyond_tolerance(refined.front().effects))) {
+      return;
+    }
     for (const RefinedTogether& each : refined) {
-      result.refined.push_back(each.effects.front());
-      evidence.push_back(each.evidence);
+      answers.push_back({each, chance});
+    }
+    std::stable_sort(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) {
+      return a.effects.evidence.value > b.effects.evidence.value;
+    });
+  }
+
+  bool all_beyond_tolerance(const std::vector<RefinedEffect>& found) const {
+    return std::all_of(found.begin(), found.end(),
+                       [&](const RefinedEffect& each) { return is_beyond_tolerance(each, effects()[each.effect]); });
+  }
+
+  /// Of each set of names the best; those that come near the best of all.
+  /// @param answers the best one first.
+  std::vector<std::vector<RefinedEffect>> best_sets(const std::vector<Answer>& answers) const {
+    std::vector<std::vector<RefinedEffect>> sets;
+    std::set<std::set<std::string>> names;
+    const double least = answers.front().effects.distance;
+    for (const Answer& each : answers) {
+      std::set<std::string> own;
+      for (const RefinedEffect& effect : each.effects.effects) {
+        own.insert(answer(effect));
+      }
+      const bool is_near = relative_fall(each.effects.distance, least) < 3 * each.chance.fall;
+      if (sets.size() < static_cast<std::size_t>(settings_.beam) && is_near && names.insert(own).second) {
+        sets.push_back(each.effects.effects);
+      }
+    }
+    return sets;
+  }
+
+  /// Of the first round, each with its probability.
+  void keep_refined(const std::vector<Answer>& answers, MissingEffect& result) const {
+    std::vector<Evidence> evidence;
+    for (const Answer& each : answers) {
+      result.refined.push_back(each.effects.effects.front());
+      evidence.push_back(each.effects.evidence);
     }
     set_probabilities(result.refined, evidence);
   }

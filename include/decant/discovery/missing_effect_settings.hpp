@@ -34,11 +34,12 @@ struct MissingEffectSettings {
   double sure = 0.9;               ///< how probable an effect has to be among those that were refined to be the
                                    ///< answer, 0 .. 1; else it is one of those that are so together
   int most_effects = 3;            ///< that are added one after another, >= 1
-  double reference_factor = 1.1;   ///< on what references do, >= 1: beyond it something is missing
-  double most_unlike = 0.5;        ///< references that look more unlike a recording teach nothing about how its
-                                   ///< features are off, >= 0; see RecordedEvidence::unlikeness
-  int least_references = 2;        ///< that have to look like a recording for them to teach that, >= 2
-  double threshold = 4;            ///< of find_disagreements
+  int beam = 2;                   ///< sets that further effects are looked for beside, if they come near the best, >= 1
+  double reference_factor = 1.1;  ///< on what references do, >= 1: beyond it something is missing
+  double most_unlike = 0.5;       ///< references that look more unlike a recording teach nothing about how its
+                                  ///< features are off, >= 0; see RecordedEvidence::unlikeness
+  int least_references = 2;       ///< that have to look like a recording for them to teach that, >= 2
+  double threshold = 4;           ///< of find_disagreements
 };
 
 }  // namespace decant::inline DECANT_TARGET
