@@ -91,6 +91,7 @@ InteractionEffect<Model> force_effect(Effect effect, Set set, ForceBegins begins
         }
         set(force, own);
       } else {
+        static_cast<void>(first);
         set(force, as.strength[0]);
       }
     });
