@@ -239,10 +239,8 @@ inline void add_where_map(decant::HtmlReport& report, const RecordedInteraction&
   for (const std::size_t each : of.frames) {
     frame = of.recording.timestamps[each] <= *map.begin + 1e-9 ? each : frame;
   }
-  decant::Recording seen_by_it = of.recording;
-  std::swap(seen_by_it.cameras.front(), seen_by_it.cameras[of.cameras.front()]);
   const Region all{0, 0, of.recording.height, of.recording.width};
-  report.picture(where_picture(draw_bodies(seen_by_it, {frame}, all, {1}).front(), map),
+  report.picture(where_picture(draw_bodies(of.recording, {frame}, all, {1}, of.cameras.front()).front(), map),
                  of.recording.name +
                      ": amber is liquid that the model does not have, blue is where it has too much; "
                      "the stronger, the farther beyond chance, all times together. The bodies are as "

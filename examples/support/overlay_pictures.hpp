@@ -92,11 +92,11 @@ inline decant::Image<std::uint8_t> bodies_from_depth(const decant::Image<float>&
   return picture;
 }
 
-/// The bodies as the first camera sees them, frame after frame.
+/// The bodies as one of the recording's cameras sees them, frame after frame. @param which its number.
 template <class Camera>
 std::vector<decant::Image<std::uint8_t>> draw_bodies(const decant::Recording& recording, const Camera& camera,
                                                      const std::vector<std::size_t>& frames, const Region& region,
-                                                     decant::Threads threads) {
+                                                     decant::Threads threads, std::size_t which) {
   std::vector<decant::BoundingVolumeHierarchy> surfaces;
   for (const auto& each : recording.bodies) {
     surfaces.emplace_back(each.mesh);
@@ -104,7 +104,7 @@ std::vector<decant::Image<std::uint8_t>> draw_bodies(const decant::Recording& re
   decant::DepthBuffer<Camera> buffer{decant::PosedCamera<Camera>(camera)};
   std::vector<decant::Image<std::uint8_t>> pictures;
   for (const std::size_t frame : frames) {
-    buffer.set_camera_pose(recording.cameras.front().view(frame).camera_from_world);
+    buffer.set_camera_pose(recording.cameras[which].view(frame).camera_from_world);
     buffer.clear();
     for (std::size_t k = 0; k < surfaces.size(); ++k) {
       buffer.draw(surfaces[k], recording.bodies[k].motion.at(recording.timestamps[frame]), threads);
@@ -116,11 +116,12 @@ std::vector<decant::Image<std::uint8_t>> draw_bodies(const decant::Recording& re
 
 inline std::vector<decant::Image<std::uint8_t>> draw_bodies(const decant::Recording& recording,
                                                             const std::vector<std::size_t>& frames,
-                                                            const Region& region, decant::Threads threads) {
-  const auto& view = recording.cameras.front().view(0);
+                                                            const Region& region, decant::Threads threads,
+                                                            std::size_t which = 0) {
+  const auto& view = recording.cameras.at(which).view(0);
   const auto camera = camera_of(view, recording.width, recording.height);
-  return view.distorted() ? draw_bodies(recording, camera, frames, region, threads)
-                          : draw_bodies(recording, camera.pinhole(), frames, region, threads);
+  return view.distorted() ? draw_bodies(recording, camera, frames, region, threads, which)
+                          : draw_bodies(recording, camera.pinhole(), frames, region, threads, which);
 }
 
 /// The bodies' picture with the liquid on top.

@@ -45,25 +45,28 @@ std::optional<SeenPlace> place_of_liquid(const Model& model, const Camera& camer
   const Vector3<double> begin = world_from_camera * camera.unproject(pixel, 0);
   const Vector3<double> along = (world_from_camera * camera.unproject(pixel, 1) - begin).normalized();
   const auto& fluid = model.fluid();
-  const double on_ray = model.spacing();  // of what is nearer to it than that
-  double reach = 0, least = std::numeric_limits<double>::infinity();
-  bool is_on_ray = false;
+  constexpr double none = std::numeric_limits<double>::infinity();
+  double front = none, beside = none, least_angle = none;  // of the liquid on the ray, and of that beside it
   for (Index i = 0; i < fluid.size(); ++i) {
     const Vector3<double> off = fluid.position.col(i).template cast<double>() - begin;
     const double depth = off.dot(along), aside = (off - depth * along).norm();
-    if (!(depth > 0) || (is_on_ray && aside > on_ray)) {
+    if (!(depth > 0)) {
       continue;
     }
-    const double rank = aside <= on_ray ? depth : aside / depth;  // the front of what is there; else the nearest
-    if (rank < least || (aside <= on_ray && !is_on_ray)) {
-      is_on_ray = aside <= on_ray;
-      reach = depth;
-      least = rank;
+    if (aside <= model.spacing()) {
+      front = std::min(front, depth);
+    } else if (aside / depth < least_angle) {
+      least_angle = aside / depth;
+      beside = depth;
     }
   }
-  SeenPlace seen{begin + reach * along, 0, std::numeric_limits<double>::infinity()};
+  const double reach = std::isfinite(front) ? front : beside;
+  if (!std::isfinite(reach)) {
+    return std::nullopt;
+  }
+  SeenPlace seen{begin + reach * along, 0, none};
   const auto& bodies = model.bodies();
-  for (std::size_t body = 0; reach > 0 && body < bodies.size(); ++body) {
+  for (std::size_t body = 0; body < bodies.size(); ++body) {
     const auto& each = bodies[static_cast<BodyId>(body)];
     const auto nearest =
         each.surface->closest_point(each.motion.at(model.time()).inverse() * seen.place, seen.distance);

@@ -36,6 +36,11 @@ struct ChanceLevel {
 /// as what a solver has of its own, and that is the scale of what is left: so is the F-test's of linear models.
 inline double relative_fall(double before, double after) noexcept { return (before - after) / std::max(after, 1e-12); }
 
+/// Whether what leaves a distance may yet turn out to be what leaves least.
+inline bool comes_near(double distance, double best, const ChanceLevel& chance) noexcept {
+  return relative_fall(distance, best) < 3 * chance.fall;
+}
+
 /// The logarithm of how likely something is [nat], up to a constant, as far as a few runs of a model tell.
 struct Evidence {
   double value = 0;

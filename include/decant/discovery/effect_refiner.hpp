@@ -277,11 +277,6 @@ class EffectRefiner {
     }
   }
 
-  /// Whether an effect that leaves so much may yet be the best one.
-  static bool comes_near(double distance, double best, const ChanceLevel& chance) {
-    return relative_fall(distance, best) < 3 * chance.fall;
-  }
-
   /// Leaves the best one, the next best one as its rival, and all others that may come near it.
   static void keep_promising(std::vector<Candidate>& candidates, const ChanceLevel& chance) {
     std::vector<double> sorted;

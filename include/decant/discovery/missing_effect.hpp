@@ -111,7 +111,7 @@ class MissingEffectSearch {
       if (answers->empty()) {
         break;
       }
-      const RefinedTogether& best = answers->front().effects;
+      const RefinedTogether& best = answers->front().refined;
       const ChanceLevel& chance = answers->front().chance;
       const bool gains = relative_fall(result.learn.after, best.distance) > chance.fall;
       gap_stands = gap_stands || gains;
@@ -165,7 +165,7 @@ class MissingEffectSearch {
 
   /// Effects that may be what is missing, together, and what chance does beside those that were found before them.
   struct Answer {
-    RefinedTogether effects;
+    RefinedTogether refined;
     ChanceLevel chance;
   };
 
@@ -246,7 +246,7 @@ class MissingEffectSearch {
       answers.push_back({each, chance});
     }
     std::stable_sort(answers.begin(), answers.end(), [](const Answer& a, const Answer& b) {
-      return a.effects.evidence.value > b.effects.evidence.value;
+      return a.refined.evidence.value > b.refined.evidence.value;
     });
   }
 
@@ -260,15 +260,15 @@ class MissingEffectSearch {
   std::vector<std::vector<RefinedEffect>> best_sets(const std::vector<Answer>& answers) const {
     std::vector<std::vector<RefinedEffect>> sets;
     std::set<std::set<std::string>> names;
-    const double least = answers.front().effects.distance;
+    const double least = answers.front().refined.distance;
     for (const Answer& each : answers) {
       std::set<std::string> own;
-      for (const RefinedEffect& effect : each.effects.effects) {
+      for (const RefinedEffect& effect : each.refined.effects) {
         own.insert(answer(effect));
       }
-      const bool is_near = relative_fall(each.effects.distance, least) < 3 * each.chance.fall;
-      if (sets.size() < static_cast<std::size_t>(settings_.beam) && is_near && names.insert(own).second) {
-        sets.push_back(each.effects.effects);
+      if (sets.size() < static_cast<std::size_t>(settings_.beam) &&
+          comes_near(each.refined.distance, least, each.chance) && names.insert(own).second) {
+        sets.push_back(each.refined.effects);
       }
     }
     return sets;
@@ -278,8 +278,8 @@ class MissingEffectSearch {
   void keep_refined(const std::vector<Answer>& answers, MissingEffect& result) const {
     std::vector<Evidence> evidence;
     for (const Answer& each : answers) {
-      result.refined.push_back(each.effects.effects.front());
-      evidence.push_back(each.effects.evidence);
+      result.refined.push_back(each.refined.effects.front());
+      evidence.push_back(each.refined.evidence);
     }
     set_probabilities(result.refined, evidence);
   }
