@@ -427,6 +427,15 @@ TEST_CASE("missing effect: what is not in the catalogue is unexplained, and wher
   CHECK(first < 0.6);
 }
 
+TEST_CASE("missing effect: what would have to be stronger than it is looked for up to is no answer") {
+  CHECK(found_in({2.1}, 62).verdict == Verdict::Named);  // up to half as far off again as the 1.5 of the catalogue
+  const MissingEffect result = found_in({2.5}, 62);
+  CHECK(result.verdict == Verdict::Unexplained);
+  REQUIRE(!result.refined.empty());
+  CHECK(JetModel().effects()[result.refined.front().effect].name == "drag");
+  CHECK(result.refined.front().strength[0] == Approx(2.25).epsilon(1e-5));
+}
+
 TEST_CASE("missing effect: what is elsewhere than it usually is is found where recordings begin to disagree") {
   // a tap over the empty half of the picture, and no other stream that overlaps with it
   const Jet hidden{0, 0, 1, 0, 0, 0, 25, 0.3, 0.65};

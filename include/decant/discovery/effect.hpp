@@ -27,6 +27,9 @@ struct EffectComponent {
   double high = 1;       ///<
   double tolerance = 0;  ///< up to so much off the base nothing is missing, >= 0: it is drawn with all else that is
                          ///< tolerated; 0: the model is sure of it
+
+  /// What a closer look may come to, lowest and highest: half as far off again as what is looked through at first.
+  std::pair<double, double> limits() const noexcept { return {base + 1.5 * (low - base), base + 1.5 * (high - base)}; }
 };
 
 /// What an effect is about.

@@ -99,7 +99,7 @@ class EffectPoint {
     return std::max({0.3 * std::abs(value_[k] - component.base), 0.05 * (component.high - component.low),
                      of.least_step[k - of.begin]});
   }
-  /// The range of a number: strengths may be half as large again as those that are looked through at first.
+  /// The range of a number: of a strength see EffectComponent::limits.
   std::pair<double, double> range(Eigen::Index k) const {
     const Part& of = part_of(k);
     if (k >= of.time()) {
@@ -111,9 +111,7 @@ class EffectPoint {
       const double middle = (*of.effect->place)[k - of.place()];
       return {middle - of.effect->place_tolerance, middle + of.effect->place_tolerance};
     }
-    const EffectComponent& component = of.effect->components[static_cast<std::size_t>(k - of.begin)];
-    return {component.base + 1.5 * (component.low - component.base),
-            component.base + 1.5 * (component.high - component.base)};
+    return of.effect->components[static_cast<std::size_t>(k - of.begin)].limits();
   }
   /// The same with one number changed, kept in its range.
   EffectPoint with(Eigen::Index k, double value) const {

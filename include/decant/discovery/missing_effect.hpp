@@ -286,13 +286,19 @@ class MissingEffectSearch {
 
   /// The more effects, the more of what nothing in the catalogue explains they can take over. Where all that is left
   /// may be chance, as far as few runs tell, nothing is left to explain, whatever its share: what reality is off by
-  /// where nothing is missing may be more than the model's own runs are.
-  Explanation explained_by(const RefinedTogether& effects, const ChanceLevel& chance) const {
-    const double least = 1 - (1 - settings_.least_share) / static_cast<double>(effects.effects.size());
-    const bool leaves_little = effects.distance <= settings_.most_left * chance.largest_distance;
-    const bool down_to_chance = effects.distance - effects.distance_deviation <= chance.largest_distance;
-    return {leaves_little && (down_to_chance || effects.share >= least),
-            down_to_chance || (leaves_little && effects.share >= settings_.enough_share)};
+  /// where nothing is missing may be more than the model's own runs are. Of an effect that would have to be stronger
+  /// than what it is looked for up to, it is not known what would be left: what is missing is likely to be another one
+  /// that it stands in for.
+  Explanation explained_by(const RefinedTogether& found, const ChanceLevel& chance) const {
+    if (std::any_of(found.effects.begin(), found.effects.end(),
+                    [&](const RefinedEffect& each) { return is_at_limit(each, effects()[each.effect]); })) {
+      return {false, false};
+    }
+    const double least = 1 - (1 - settings_.least_share) / static_cast<double>(found.effects.size());
+    const bool leaves_little = found.distance <= settings_.most_left * chance.largest_distance;
+    const bool down_to_chance = found.distance - found.distance_deviation <= chance.largest_distance;
+    return {leaves_little && (down_to_chance || found.share >= least),
+            down_to_chance || (leaves_little && found.share >= settings_.enough_share)};
   }
 
   /// Deviations of the recording, each over what draws have there.

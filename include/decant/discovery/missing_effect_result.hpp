@@ -55,6 +55,19 @@ inline bool is_beyond_tolerance(const RefinedEffect& found, const Effect& effect
   return false;
 }
 
+/// Whether any of an effect's components came to a limit of what is looked for, and would go on. The base is none.
+inline bool is_at_limit(const RefinedEffect& found, const Effect& effect) {
+  for (std::size_t k = 0; k < effect.components.size(); ++k) {
+    const auto [low, high] = effect.components[k].limits();
+    const double strength = found.strength[static_cast<Eigen::Index>(k)], base = effect.components[k].base;
+    const double close = 1e-6 * (high - low);  // strengths are rounded
+    if ((high > base && strength >= high - close) || (low < base && strength <= low + close)) {
+      return true;
+    }
+  }
+  return false;
+}
+
 /// Whether an effect that was found also explains recordings that were not used.
 enum class Confirmation {
   Untested,     ///< there were no such recordings, or nothing was found
