@@ -68,6 +68,7 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
                          {"strength", components_json(found.strength)},
                          {"unit", effect.unit},
                          {"share", number_json(found.share)},
+                         {"grown", number_json(found.grown)},
                          {"distance", number_json(found.distance)},
                          {"probability", number_json(found.probability)}};
   for (std::size_t k = 0; k < effect.components.size(); ++k) {
@@ -158,6 +159,8 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
       text += ", which explains ";
       text += decant::detail::fixed_text(100 * result.refined.front().share, 0);
       text += " % of what is reducible";
+      const double grown = 100 * result.refined.front().grown;
+      text += grown < 1 ? "" : ", but at some times makes the gap grow, by " + decant::detail::fixed_text(grown, 0) + " %";
     }
     return text + ".";
   }

@@ -436,6 +436,27 @@ TEST_CASE("missing effect: what would have to be stronger than it is looked for 
   CHECK(result.refined.front().strength[0] == Approx(2.25).epsilon(1e-5));
 }
 
+TEST_CASE("missing effect: what makes a gap at times at which there was none stands in for something else") {
+  // a pull from 0.2 s on; one from the beginning, which the model knows of, takes most of the gap away
+  Jet jet;
+  jet.gust = 1;
+  jet.gust_from = 0.2;
+  jet.gust_until = 9;
+  const MissingEffect result = found_in(jet, 63);
+  CHECK(result.verdict == Verdict::Unexplained);
+  REQUIRE(!result.refined.empty());
+  CHECK(result.refined.front().share > 0.8);
+  CHECK(result.refined.front().grown > 0.03);
+
+  const MissingEffect pulled = found_in({0, 1}, 63);
+  CHECK(pulled.verdict == Verdict::Named);
+  CHECK(pulled.refined.front().grown < 0.001);
+
+  MissingEffectSettings settings;
+  settings.most_grown = 1;
+  CHECK(found_in(jet, 63, settings).verdict == Verdict::Named);
+}
+
 TEST_CASE("missing effect: what is elsewhere than it usually is is found where recordings begin to disagree") {
   // a tap over the empty half of the picture, and no other stream that overlaps with it
   const Jet hidden{0, 0, 1, 0, 0, 0, 25, 0.3, 0.65};
@@ -752,9 +773,11 @@ TEST_CASE("missing effect: a second one that does not help where it was not lear
   const JetModel model(0.9), other(0.6);
   ThreadExecutor executor{{1}};
   const Jet pulled_late{0, 0.8, 1, 0.05}, pulled{0, 0.8};
+  MissingEffectSettings settings;
+  settings.most_grown = 1;  // alone, a pull makes poses that are late stand out more at the beginning
   const auto found = [&](const Jet& held_out) {
     return MissingEffectSearch<JetModel>({{"a", &model, film_of(pulled_late, 72, 0.9)}},
-                                         {{"b", &other, film_of(held_out, 73, 0.6)}}, run_jobs_on(executor))
+                                         {{"b", &other, film_of(held_out, 73, 0.6)}}, run_jobs_on(executor), settings)
         .find();
   };
   CHECK(found(pulled_late).found.size() == 2);
@@ -779,6 +802,7 @@ TEST_CASE("missing effect: the more effects, the less they may leave, and one th
   MissingEffectSettings settings;
   settings.least_share = 0.5;  // so two may leave a quarter
   settings.most_left = 100;    // a gust is far more than what chance does
+  settings.most_grown = 1;     // and is over when a pull is not
   const MissingEffect two = found_alone(settings);
   CHECK(two.verdict == Verdict::Named);
   REQUIRE(two.found.size() == 2);
@@ -794,6 +818,7 @@ TEST_CASE("missing effect: what explains enough alone stands where a second one 
   MissingEffectSettings settings;
   settings.least_share = 0.54;  // two would have to explain 0.77; they explain 0.55 and 0.76 of a gust
   settings.most_left = 100;
+  settings.most_grown = 1;
   const MissingEffect result = found_in({0, 0, 1, 0, 4}, 75, settings);
   CHECK(result.verdict == Verdict::Named);
   REQUIRE(result.found.size() == 1);

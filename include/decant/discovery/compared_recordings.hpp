@@ -44,6 +44,7 @@ struct ComparedRecordings {
 struct DistanceLeft {
   double value = 0;      ///< in the mean
   double deviation = 0;  ///< standard, of the few runs; by leaving out one of them at a time
+  double grown = 0;      ///< see grown_gap; the most of any recording
 };
 
 namespace detail {
@@ -76,6 +77,9 @@ inline DistanceLeft distance_left(std::span<const RecordedEvidence> recorded, st
     const std::vector<Observation> own(runs.begin(), runs.begin() + static_cast<std::ptrdiff_t>(seeds));
     runs = runs.subspan(seeds);
     left.value += detail::distance_left(of, own) / count;
+    if (const auto middle = of.mean_features(own)) {
+      left.grown = std::max(left.grown, of.gap_grown(*middle));
+    }
     // the jackknife (Efron and Tibshirani, An Introduction to the Bootstrap, 1993)
     double sum = 0, squares = 0;
     for (std::size_t k = 0; seeds > 1 && k < seeds; ++k) {

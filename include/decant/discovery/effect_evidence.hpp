@@ -23,6 +23,7 @@
 #include <decant/discovery/effect.hpp>
 #include <decant/discovery/effect_curve.hpp>
 #include <decant/discovery/effect_dictionary.hpp>
+#include <decant/discovery/gap_over_time.hpp>
 #include <decant/discovery/nuisance_space.hpp>
 #include <decant/discovery/observation.hpp>
 #include <decant/discovery/observation_features.hpp>
@@ -73,7 +74,8 @@ class RecordedEvidence {
         dictionary_(&dictionary),
         settings_(settings),
         references_(std::move(references)),
-        features_(recording_, working(dictionary), settings.features, settings.readings) {
+        features_(recording_, working(dictionary), settings.features, settings.readings),
+        over_time_(features_) {
     const std::vector<std::size_t> baselines = dictionary.of_role(RunRole::Baseline);
     draws_ = dictionary.of_role(RunRole::Draw);
     expects(!baselines.empty(), "RecordedEvidence: baselines that worked", "at least one", "none");
@@ -104,6 +106,7 @@ class RecordedEvidence {
     sample_.floor = features_.floor(settings.nuisance.floor);
     space_ = std::make_unique<NuisanceSpace>(sample_, settings.nuisance);
     own_ = space_->as_modelled(features_.of(recording_));
+    note_chance();
   }
 
   const ObservationFeatures& features() const noexcept { return features_; }
@@ -117,6 +120,15 @@ class RecordedEvidence {
   /// What a model would have to predict for what was recorded.
   const Eigen::VectorXd& recorded_features() const noexcept { return own_; }
   const Eigen::VectorXd& draw_features(std::size_t draw) const { return of_run_.at(draws_.at(draw)); }
+
+  /// How far the recording is off what a model predicts, by feature, over what draws are off there.
+  Eigen::VectorXd beyond_chance(const Eigen::VectorXd& predicted) const {
+    return space_->standardised_difference(own_ - predicted).cwiseQuotient(usual_);
+  }
+  /// See grown_gap: from the model as it is to one that predicts this.
+  double gap_grown(const Eigen::VectorXd& predicted) const {
+    return grown_gap(over_time_(beyond_chance(space_->center())), over_time_(beyond_chance(predicted)), gap_by_chance_);
+  }
 
   /// The mean features of runs; nothing if one of them failed.
   std::optional<Eigen::VectorXd> mean_features(std::span<const Observation> runs) const {
@@ -237,6 +249,20 @@ class RecordedEvidence {
     return runs;
   }
 
+  /// What draws are off by, in the mean by feature, and the most of them by moment.
+  void note_chance() {
+    Eigen::VectorXd square = Eigen::VectorXd::Zero(space_->features());
+    for (std::size_t draw = 0; draw < draws(); ++draw) {
+      square += space_->standardised(draw_features(draw)).cwiseAbs2() / static_cast<double>(draws());
+    }
+    usual_ = square.array().sqrt() + 0.5;
+    gap_by_chance_ = over_time_(Eigen::VectorXd::Zero(space_->features()));
+    for (std::size_t draw = 0; draw < draws(); ++draw) {
+      const Eigen::VectorXd off = space_->standardised(draw_features(draw)).cwiseQuotient(usual_);
+      gap_by_chance_ = gap_by_chance_.cwiseMax(over_time_(off));
+    }
+  }
+
   EffectEvidence evidence(const Observation& seen, const Eigen::VectorXd& features, const NuisanceSpace& space) const {
     EffectEvidence result;
     const Eigen::VectorXd standardised = space.standardised(features);
@@ -342,6 +368,9 @@ class RecordedEvidence {
   std::map<std::size_t, Eigen::VectorXd> of_run_{};
   NuisanceSample sample_{};
   std::unique_ptr<NuisanceSpace> space_{};
+  GapOverTime over_time_;
+  Eigen::VectorXd usual_{};          ///< by feature: what draws are off by, see beyond_chance
+  Eigen::VectorXd gap_by_chance_{};  ///< by moment: the largest of any draw
 };
 
 }  // namespace decant::inline DECANT_TARGET

@@ -38,6 +38,7 @@ struct RefinedTogether {
   std::vector<RefinedEffect> effects{};  ///< the new one last
   double distance = 0, share = 0;        ///< see RefinedEffect
   double distance_deviation = 0;         ///< standard, of few runs
+  double grown = 0;                      ///< see grown_gap
   /// Of what is left, less one for each number that was fitted: so much they take away by chance (Akaike, IEEE Trans.
   /// Autom. Control 19, 1974).
   Evidence evidence{};
@@ -460,13 +461,14 @@ class EffectRefiner {
       const double more = std::sqrt(std::max(1.0, reached.left.value / std::max(known.chance.distance, 1e-12)));
       deviation = more * deviations(point, reached.candidate->path.views(), known);
     }
-    RefinedTogether one{{}, reached.left.value, share, reached.left.deviation, reached.evidence};
+    const DistanceLeft& left = reached.left;
+    RefinedTogether one{{}, left.value, share, left.deviation, left.grown, reached.evidence};
     for (std::size_t part = 0; part < point.effects(); ++part) {
       const AppliedEffect applied = point.applied(part);
       const auto [begin, count] = point.strength_of(part);
       const std::size_t judged = part < found.size() ? found[part].judged : reached.candidate->judged;
       one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
-                             applied.window, one.distance, one.share});
+                             applied.window, one.distance, one.share, one.grown});
     }
     return one;
   }

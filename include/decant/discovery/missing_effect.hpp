@@ -80,6 +80,7 @@ class MissingEffectSearch {
             settings_.least_share);
     expects(settings_.enough_share >= 0 && settings_.enough_share <= 1, "MissingEffectSettings: enough_share", "0 .. 1",
             settings_.enough_share);
+    expects(settings_.most_grown >= 0, "MissingEffectSettings: most_grown", ">= 0", settings_.most_grown);
     expects(settings_.most_left > 0, "MissingEffectSettings: most_left", "> 0", settings_.most_left);
     expects(settings_.promising_factor >= 0, "MissingEffectSettings: promising_factor", ">= 0",
             settings_.promising_factor);
@@ -194,7 +195,7 @@ class MissingEffectSearch {
     Judgement judgement = judged(known);
     result.learn = {judgement.distance, judgement.distance, known.chance.distance, known.chance.fall};
     for (const RecordedEvidence& each : known.recorded) {
-      const Eigen::VectorXd off = beyond_chance(each);
+      const Eigen::VectorXd off = each.beyond_chance(each.space().center());
       const ObservationFeatures& features = each.features();
       result.where.push_back(
           find_disagreements(features.silhouettes(), features.of_silhouettes(off), settings_.threshold));
@@ -288,7 +289,7 @@ class MissingEffectSearch {
   /// may be chance, as far as few runs tell, nothing is left to explain, whatever its share: what reality is off by
   /// where nothing is missing may be more than the model's own runs are. Of an effect that would have to be stronger
   /// than what it is looked for up to, it is not known what would be left: what is missing is likely to be another one
-  /// that it stands in for.
+  /// that it stands in for. So is what makes the gap grow at some times, unless all of it may be chance.
   Explanation explained_by(const RefinedTogether& found, const ChanceLevel& chance) const {
     if (std::any_of(found.effects.begin(), found.effects.end(),
                     [&](const RefinedEffect& each) { return is_at_limit(each, effects()[each.effect]); })) {
@@ -297,19 +298,9 @@ class MissingEffectSearch {
     const double least = 1 - (1 - settings_.least_share) / static_cast<double>(found.effects.size());
     const bool leaves_little = found.distance <= settings_.most_left * chance.largest_distance;
     const bool down_to_chance = found.distance - found.distance_deviation <= chance.largest_distance;
-    return {leaves_little && (down_to_chance || found.share >= least),
-            down_to_chance || (leaves_little && found.share >= settings_.enough_share)};
-  }
-
-  /// Deviations of the recording, each over what draws have there.
-  static Eigen::VectorXd beyond_chance(const RecordedEvidence& recorded) {
-    Eigen::VectorXd square = Eigen::VectorXd::Zero(recorded.space().features());
-    for (std::size_t draw = 0; draw < recorded.draws(); ++draw) {
-      const Eigen::VectorXd off = recorded.space().standardised(recorded.draw_features(draw));
-      square.array() += off.array().square() / static_cast<double>(recorded.draws());
-    }
-    const Eigen::VectorXd usual = square.array().sqrt() + 0.5;
-    return recorded.standardised().cwiseQuotient(usual);
+    const bool takes_away = leaves_little && found.grown <= settings_.most_grown;
+    return {leaves_little && (down_to_chance || (takes_away && found.share >= least)),
+            down_to_chance || (takes_away && found.share >= settings_.enough_share)};
   }
 
   /// Those that are the answer with enough probability together, the most probable ones first, if they are several;
@@ -428,7 +419,10 @@ class MissingEffectSearch {
     } else {
       const bool shrinks = relative_fall(gap.before, gap.after) > gap.by_chance;
       const bool best = !(gap.best_rival < gap.after);
-      result.confirmation = shrinks && best ? Confirmation::Confirmed : Confirmation::Refuted;
+      const bool at_all_times =
+          after.front().grown <= settings_.most_grown || gap.after <= known.chance.largest_distance;
+      result.confirmation =
+          shrinks && best && at_all_times ? Confirmation::Confirmed : Confirmation::Refuted;
     }
   }
 

@@ -31,6 +31,7 @@ struct RefinedEffect {
   std::optional<TimeWindow> window{};      ///< likewise
   double distance = 0;                     ///< that is left of the recordings it was found in
   double share = 0;                        ///< of what is reducible, at most 1
+  double grown = 0;                        ///< by how much the gap grows at some moments, see grown_gap
   /// That it is what is missing, alone, if one of those that were refined first is; by all recordings.
   double probability = std::numeric_limits<double>::quiet_NaN();
 
@@ -72,7 +73,7 @@ inline bool is_at_limit(const RefinedEffect& found, const Effect& effect) {
 enum class Confirmation {
   Untested,     ///< there were no such recordings, or nothing was found
   NotTestable,  ///< they show no gap
-  Confirmed,    ///< their gap shrinks by more than chance, and by more than with any rival
+  Confirmed,    ///< their gap shrinks by more than chance, by more than with any rival, and at all times
   Refuted       ///< it does not
 };
 

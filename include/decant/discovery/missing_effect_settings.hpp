@@ -27,6 +27,8 @@ struct MissingEffectSettings {
   double most_left = 5;            ///< over what chance leaves at most, > 0: what leaves more of a gap does not explain
                                    ///< it, whatever its share. Effects of a simulation are not those of reality to
                                    ///< the last cell; where a model is as exact as its sensors ask for 1 to 2
+  double most_grown = 0.02;        ///< >= 0: what makes the gap grow by more than this share of it at moments at which
+                                   ///< it grows does not explain it: it stands in for something else
   double enough_share = 0.85;      ///< nothing else is looked for beside effects that explain so much, 0 .. 1:
                                    ///< what is left may be how the model has them
   double promising_factor = 0.8;   ///< on n / (n + 1), >= 0: unless n effects explain so much, no further one is
