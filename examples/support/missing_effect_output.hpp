@@ -210,19 +210,24 @@ inline std::string references_sentence(std::size_t references, const decant::Mis
 
 namespace detail {
 
-/// Of all recordings, or the heaviest one if there are single squares alone. Nothing if there is none.
-inline const decant::Disagreement* earliest_of_all(const std::vector<std::vector<decant::Disagreement>>& where) {
-  const decant::Disagreement *first = nullptr, *heaviest = nullptr;
+/// Of all recordings the first, or that of the heaviest disagreement if there are single squares alone. Nothing if there
+/// is none.
+inline std::optional<decant::Onset> first_onset(const std::vector<std::vector<decant::Disagreement>>& where) {
+  std::optional<decant::Onset> first;
+  const decant::Disagreement* heaviest = nullptr;
   for (const auto& recording : where) {
-    const decant::Disagreement* one = decant::earliest(recording);
-    if (one != nullptr && (first == nullptr || one->begin < first->begin)) {
+    const std::optional<decant::Onset> one = decant::onset(recording);
+    if (one && (!first || one->begin < first->begin)) {
       first = one;
     }
     if (!recording.empty() && (heaviest == nullptr || recording.front().weight > heaviest->weight)) {
       heaviest = &recording.front();
     }
   }
-  return first != nullptr ? first : heaviest;
+  if (!first && heaviest != nullptr) {
+    first = decant::Onset{heaviest->camera, heaviest->begin, heaviest->onset_u, heaviest->onset_v};
+  }
+  return first;
 }
 
 }  // namespace detail
@@ -273,7 +278,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                                      {"below", number_json(each.below)},
                                      {"above", number_json(each.above)}});
   }
-  const decant::Disagreement* earliest = detail::earliest_of_all(result.where);
+  const std::optional<decant::Onset> onset = detail::first_onset(result.where);
   double first_read = std::numeric_limits<double>::infinity();
   for (const auto& recording : result.where_read) {
     for (const decant::ReadingDisagreement& each : recording) {
@@ -282,10 +287,10 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
   }
   const decant::RefinedEffect* timed =
       !result.found.empty() && result.found.front().window ? &result.found.front() : nullptr;
-  json["onset_s"] = timed != nullptr      ? number_json(timed->window->from)
-                    : earliest != nullptr ? nlohmann::json(std::min(earliest->begin, first_read))
-                                          : number_json(first_read);
-  json["onset_px"] = earliest != nullptr ? nlohmann::json({earliest->onset_u, earliest->onset_v}) : nlohmann::json();
+  json["onset_s"] = timed != nullptr ? number_json(timed->window->from)
+                    : onset          ? nlohmann::json(std::min(onset->begin, first_read))
+                                     : number_json(first_read);
+  json["onset_px"] = onset ? nlohmann::json({onset->u, onset->v}) : nlohmann::json();
   json["gap"] = {{"before", number_json(result.learn.before)},
                  {"after", number_json(result.learn.after)},
                  {"noise", number_json(result.learn.noise)},

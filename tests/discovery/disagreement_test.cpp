@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -141,6 +142,28 @@ TEST_CASE("disagreement: each keeps its squares, and the earliest is none of a s
   off.setZero();
   set(0, 6, 8, 9);
   CHECK(earliest(find_disagreements(features, off)) == nullptr);
+}
+
+TEST_CASE("disagreement: recordings begin to be off amid all that is too much and too little then") {
+  const SilhouetteFeatures features = features_everywhere();
+  Eigen::VectorXd off = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(features.size()));
+  const auto set = [&](int window, int row, int column, double value) {
+    off[static_cast<Eigen::Index>(feature_at(features, 0, window, row, column))] = value;
+  };
+  set(0, 7, 9, 9);  // a single square is easily chance
+  set(1, 2, 2, -6);
+  set(1, 3, 2, -6);
+  set(1, 2, 6, 6);
+  set(2, 2, 7, 20);  // what comes later does not count
+  set(3, 6, 1, 20);
+  set(3, 6, 2, 20);
+  const std::optional<Onset> begins = onset(find_disagreements(features, off));
+  REQUIRE(begins);
+  CHECK(begins->begin == Approx(2.1));
+  CHECK(begins->u == Approx((24.5 + 24.5 + 64.5) / 3));
+  CHECK(begins->v == Approx((24.5 + 34.5 + 24.5) / 3));
+  off.setZero();
+  CHECK(!onset(find_disagreements(features, off)));
 }
 
 TEST_CASE("disagreement: nothing beyond the threshold is nothing, and arguments are checked") {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -139,6 +140,36 @@ inline const Disagreement* earliest(const std::vector<Disagreement>& of, bool on
     }
   }
   return first;
+}
+
+/// Where and when recordings begin to be off from a model.
+struct Onset {
+  std::size_t camera = 0;
+  double begin = 0;     ///< [s]
+  double u = 0, v = 0;  ///< middle of all that is off then [px]
+};
+
+/// Of too much liquid and too little together, in the first window of time with either: what comes to one place is
+/// missing in another, and its cause is between them. Nothing if nothing disagrees.
+inline std::optional<Onset> onset(const std::vector<Disagreement>& of) noexcept {
+  const Disagreement* first = earliest(of);
+  if (first == nullptr) {
+    return std::nullopt;
+  }
+  Onset begins{first->camera, first->begin};
+  double total = 0;
+  for (const Disagreement& each : of) {
+    for (const DisagreeingSquare& square : each.squares) {
+      if (each.camera == first->camera && each.squares.size() > 1 && square.begin <= first->begin) {
+        const double share = square.off / (total + square.off);
+        // pixel coordinates are of pixels' middles
+        begins.u += share * (0.5 * (square.box.u_begin + square.box.u_end) - 0.5 - begins.u);
+        begins.v += share * (0.5 * (square.box.v_begin + square.box.v_end) - 0.5 - begins.v);
+        total += square.off;
+      }
+    }
+  }
+  return begins;
 }
 
 /// A sensor that for a while reads more than expected, or less.
