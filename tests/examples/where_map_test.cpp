@@ -88,14 +88,14 @@ TEST_CASE("where map: the table and the JSON name the body that is near") {
   CHECK(table.find("4 mm from the pan") != std::string::npos);
   // as where no places were asked for
   CHECK(example::where_json({"a"}, result, {}).size() == 2);
-  CHECK(example::detail::earliest_of_all(result.where)->begin == 0.2);
+  CHECK(example::detail::first_onset(result.where)->begin == 0.2);
 
   result.judgement.chance.largest_distance = 3;
   result.judgement.distance = 10;
   CHECK(!example::is_diffuse(result));
   result.where = {{}};
   CHECK(example::is_diffuse(result));
-  CHECK(example::detail::earliest_of_all(result.where) == nullptr);
+  CHECK(!example::detail::first_onset(result.where));
   result.judgement.distance = 2;  // no gap
   CHECK(!example::is_diffuse(result));
 }
