@@ -128,7 +128,8 @@ void measure(const Options& options, Report& report) {
     Figures figures(title);
     long films = 0;
     const decant_test::LocatingJetModel model(0.9, Vector3<double>(0.15, 0.6, 0));
-    for (const auto& [place_x, place_y] : {std::pair{0.22, 0.67}, {0.3, 0.65}, {0.18, 0.55}, {0.1, 0.62}, {0.15, 0.6}}) {
+    for (const auto& [place_x, place_y] :
+         {std::pair{0.22, 0.67}, {0.3, 0.65}, {0.18, 0.55}, {0.1, 0.62}, {0.15, 0.6}}) {
       const double x = place_x, y = place_y;  // which a lambda may capture
       for (int k = 0; k < repetitions; ++k, ++films) {
         Jet jet;

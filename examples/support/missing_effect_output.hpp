@@ -159,8 +159,9 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
       text += ", which explains ";
       text += decant::detail::fixed_text(100 * result.refined.front().share, 0);
       text += " % of what is reducible";
-      const double grown = 100 * result.refined.front().grown;
-      text += grown < 1 ? "" : ", but at some times makes the gap grow, by " + decant::detail::fixed_text(grown, 0) + " %";
+      if (const double grown = 100 * result.refined.front().grown; grown >= 1) {
+        text += ", but at some times makes the gap grow, by " + decant::detail::fixed_text(grown, 0) + " %";
+      }
     }
     return text + ".";
   }
@@ -210,8 +211,8 @@ inline std::string references_sentence(std::size_t references, const decant::Mis
 
 namespace detail {
 
-/// Of all recordings the first, or that of the heaviest disagreement if there are single squares alone. Nothing if there
-/// is none.
+/// Of all recordings the first, or that of the heaviest disagreement if there are single squares alone. Nothing if
+/// there is none.
 inline std::optional<decant::Onset> first_onset(const std::vector<std::vector<decant::Disagreement>>& where) {
   std::optional<decant::Onset> first;
   const decant::Disagreement* heaviest = nullptr;

@@ -35,7 +35,8 @@ TEST_CASE("gap over time: squares of all cameras and readings of all sensors, by
       const std::size_t end = reading ? features.size() : features.silhouettes().size();
       for (std::size_t k = begin; k < end; ++k) {
         const double here = 1.0 + static_cast<double>(k % 5);
-        if ((reading ? features.readings().place(k - begin).window : features.silhouettes().place(k).window) == window) {
+        if ((reading ? features.readings().place(k - begin).window : features.silhouettes().place(k).window) ==
+            window) {
           off[static_cast<Eigen::Index>(k)] = here;
           expected.back() += here * here;
         }

@@ -455,6 +455,13 @@ TEST_CASE("missing effect: what makes a gap at times at which there was none sta
   MissingEffectSettings settings;
   settings.most_grown = 1;
   CHECK(found_in(jet, 63, settings).verdict == Verdict::Named);
+
+  // or only the film that is held out shows it
+  jet.gust = 1.5;
+  const MissingEffect elsewhere = found_in(jet, 62);
+  CHECK(elsewhere.verdict == Verdict::Named);
+  CHECK(elsewhere.confirmation == Confirmation::Refuted);
+  CHECK(found_in(jet, 62, settings).confirmation == Confirmation::Confirmed);
 }
 
 TEST_CASE("missing effect: what is elsewhere than it usually is is found where recordings begin to disagree") {
@@ -866,6 +873,9 @@ TEST_CASE("missing effect: what is asked is checked") {
   MissingEffectSettings settings;
   settings.refined = 0;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("refined"));
+  settings = {};
+  settings.most_grown = -1;
+  CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings), decant_test::contains("most_grown"));
   settings = {};
   settings.dictionary.draws = 3;
   CHECK_THROWS_WITH(Search({{"a", &model, film}}, {}, run_jobs, settings).find(), decant_test::contains("draws"));

@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include <decant/core/target.hpp>
 #include <decant/discovery/disagreement.hpp>
 #include <decant/discovery/effect.hpp>
@@ -49,19 +51,15 @@ struct DistanceLeft {
 
 namespace detail {
 
-/// With the mean of some runs, of which one may be left out, in place of the model as it is. What few runs' mean is off
-/// by through their own chaos is taken off, as that of many is not. Infinite where a run failed.
-inline double distance_left(const RecordedEvidence& of, std::vector<Observation> runs,
-                            std::optional<std::size_t> without = {}) {
-  if (without) {
-    runs.erase(runs.begin() + static_cast<std::ptrdiff_t>(*without));
-  }
-  const auto middle = of.mean_features(runs);
+/// With the mean of some runs in place of the model as it is. What few runs' mean is off by through their own chaos is
+/// taken off, as that of many is not. Infinite where a run failed. @param middle of the runs' features, if none failed.
+inline double distance_left(const RecordedEvidence& of, const std::optional<Eigen::VectorXd>& middle,
+                            std::size_t runs) {
   if (!middle) {
     return std::numeric_limits<double>::infinity();
   }
   const double distance = of.space().distance(of.space().standardised_difference(of.recorded_features() - *middle));
-  return std::max(0.0, distance - of.chaos() / static_cast<double>(runs.size()));
+  return std::max(0.0, distance - of.chaos() / static_cast<double>(runs));
 }
 
 }  // namespace detail
@@ -76,14 +74,15 @@ inline DistanceLeft distance_left(std::span<const RecordedEvidence> recorded, st
   for (const RecordedEvidence& of : recorded) {
     const std::vector<Observation> own(runs.begin(), runs.begin() + static_cast<std::ptrdiff_t>(seeds));
     runs = runs.subspan(seeds);
-    left.value += detail::distance_left(of, own) / count;
-    if (const auto middle = of.mean_features(own)) {
-      left.grown = std::max(left.grown, of.gap_grown(*middle));
-    }
+    const auto middle = of.mean_features(own);
+    left.value += detail::distance_left(of, middle, seeds) / count;
+    left.grown = std::max(left.grown, middle ? of.gap_grown(*middle) : 0);
     // the jackknife (Efron and Tibshirani, An Introduction to the Bootstrap, 1993)
     double sum = 0, squares = 0;
     for (std::size_t k = 0; seeds > 1 && k < seeds; ++k) {
-      const double one = detail::distance_left(of, own, k);
+      std::vector<Observation> others = own;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+      const double one = detail::distance_left(of, of.mean_features(others), seeds - 1);
       sum += one;
       squares += one * one;
     }

@@ -43,6 +43,27 @@ struct DisagreeingSquare {
   double off = 0;             ///< from what is expected, > 0, counted in what differs anyway
 };
 
+namespace detail {
+
+/// Middle of squares, each as heavy as it is off.
+class MiddleOfSquares {
+ public:
+  void add(const DisagreeingSquare& square) noexcept {
+    total_ += square.off;
+    const double share = square.off / total_;
+    // pixel coordinates are of pixels' middles
+    u_ += share * (0.5 * (square.box.u_begin + square.box.u_end) - 0.5 - u_);
+    v_ += share * (0.5 * (square.box.v_begin + square.box.v_end) - 0.5 - v_);
+  }
+  double u() const noexcept { return u_; }
+  double v() const noexcept { return v_; }
+
+ private:
+  double u_ = 0, v_ = 0, total_ = 0;
+};
+
+}  // namespace detail
+
 /// Squares of the picture that touch each other in space and time, in all of which there is more liquid than expected,
 /// or less. Where it begins points at the cause; where most of it is, at the consequence.
 struct Disagreement {
@@ -96,7 +117,6 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
     one.unexpected = is_more(component.front().second);
     one.begin = any.begin;
     one.end = any.end;
-    int first_window = any.window;
     for (const auto& [key, feature] : component) {
       const SilhouetteFeatures::Place& place = features.place(feature);
       const double size = std::abs(off[static_cast<Eigen::Index>(feature)]);
@@ -106,21 +126,15 @@ inline std::vector<Disagreement> find_disagreements(const SilhouetteFeatures& fe
       one.end = std::max(one.end, place.end);
       one.weight += size * size;
       one.largest = std::max(one.largest, size);
-      first_window = std::min(first_window, place.window);
     }
-    double total = 0;
-    for (const auto& [key, feature] : component) {
-      if (key[1] == first_window) {
-        const SilhouetteFeatures::Place& place = features.place(feature);
-        const double size = std::abs(off[static_cast<Eigen::Index>(feature)]);
-        // pixel coordinates are of pixels' middles
-        one.onset_u += size * (0.5 * (place.box.u_begin + place.box.u_end) - 0.5);
-        one.onset_v += size * (0.5 * (place.box.v_begin + place.box.v_end) - 0.5);
-        total += size;
+    detail::MiddleOfSquares middle;
+    for (const DisagreeingSquare& square : one.squares) {
+      if (square.begin <= one.begin) {
+        middle.add(square);
       }
     }
-    one.onset_u /= total;
-    one.onset_v /= total;
+    one.onset_u = middle.u();
+    one.onset_v = middle.v();
     if (one.largest > threshold || one.squares.size() >= detail::many_together) {
       found.push_back(one);
     }
@@ -150,26 +164,22 @@ struct Onset {
 };
 
 /// Of too much liquid and too little together, in the first window of time with either: what comes to one place is
-/// missing in another, and its cause is between them. Nothing if nothing disagrees.
+/// missing in another, and its cause is between them. Nothing if there are single squares alone, which are easily
+/// chance.
 inline std::optional<Onset> onset(const std::vector<Disagreement>& of) noexcept {
   const Disagreement* first = earliest(of);
   if (first == nullptr) {
     return std::nullopt;
   }
-  Onset begins{first->camera, first->begin};
-  double total = 0;
+  detail::MiddleOfSquares middle;
   for (const Disagreement& each : of) {
     for (const DisagreeingSquare& square : each.squares) {
       if (each.camera == first->camera && each.squares.size() > 1 && square.begin <= first->begin) {
-        const double share = square.off / (total + square.off);
-        // pixel coordinates are of pixels' middles
-        begins.u += share * (0.5 * (square.box.u_begin + square.box.u_end) - 0.5 - begins.u);
-        begins.v += share * (0.5 * (square.box.v_begin + square.box.v_end) - 0.5 - begins.v);
-        total += square.off;
+        middle.add(square);
       }
     }
   }
-  return begins;
+  return Onset{first->camera, first->begin, middle.u(), middle.v()};
 }
 
 /// A sensor that for a while reads more than expected, or less.

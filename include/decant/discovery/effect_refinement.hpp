@@ -199,8 +199,8 @@ inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number,
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
-/// No place or time moves more than two of its steps, no strength more than four, which effects are closer to linear in;
-/// nor does any leave its range.
+/// No place or time moves more than two of its steps, no strength more than four, which effects are closer to linear
+/// in; nor does any leave its range.
 /// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos
 /// makes steps shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates
 /// scatter would seem to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).

@@ -421,8 +421,7 @@ class MissingEffectSearch {
       const bool best = !(gap.best_rival < gap.after);
       const bool at_all_times =
           after.front().grown <= settings_.most_grown || gap.after <= known.chance.largest_distance;
-      result.confirmation =
-          shrinks && best && at_all_times ? Confirmation::Confirmed : Confirmation::Refuted;
+      result.confirmation = shrinks && best && at_all_times ? Confirmation::Confirmed : Confirmation::Refuted;
     }
   }
 
