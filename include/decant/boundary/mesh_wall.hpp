@@ -45,6 +45,8 @@ class MeshWall {
     wall.surface_ = &surface;
     wall.plane_ = WallFunction::of<Kernel>(smoothing_length, spacing);
     wall.cell_ = spacing / cells_per_spacing;
+    wall.clear_ = std::sqrt(3.0) * wall.cell_;
+    wall.clear_of_plane_ = wall.plane_.share_and_slope(wall.clear_);
     wall.build(threads);
     return wall;
   }
@@ -163,25 +165,24 @@ class MeshWall {
   /// replaced by what it is at x. Where that wall is not nearly all there is (in corners, where each wall hides some of
   /// what is behind the other) or there is no room to step back, the sum over directions.
   bool sample_close(const Vector3<double>& x, WallSample& result) const noexcept {
-    // at a cell's diagonal from the surface no cell is crossed by it
-    const double clear = std::sqrt(3.0) * cell_;
-    const auto nearest = surface_->closest_point(x, clear);
+    const auto nearest = surface_->closest_point(x, clear_);
     if (!nearest || !(nearest->distance > 1e-3 * cell_)) {
       return sample_directly(x, result);
     }
     const double distance = nearest->distance;
     const Vector3<double> toward = (nearest->point - x) / distance;
-    const Vector3<double> back = x - (clear - distance) * toward;
+    const Vector3<double> back = x - (clear_ - distance) * toward;
     WallSample farther;
     if (look_up(back, farther) != LookUp::Found || surface_->any_hit(x, back) ||
-        !(std::abs(farther.share - plane_.share(clear)) < 0.1 * plane_.share(clear))) {
+        !(std::abs(farther.share - clear_of_plane_.share) < 0.1 * clear_of_plane_.share)) {
       return sample_directly(x, result);
     }
-    const double slope = plane_.slope(distance), slope_back = plane_.slope(clear);
+    const WallFunction::ShareAndSlope here = plane_.share_and_slope(distance);
     result.distance = distance;
-    result.share = std::max(farther.share + plane_.share(distance) - plane_.share(clear), 0.0);
-    result.gradient = farther.gradient + (slope - slope_back) * toward;
-    result.moment = farther.moment + (slope * distance - slope_back * clear) * toward * toward.transpose();
+    result.share = std::max(farther.share + here.share - clear_of_plane_.share, 0.0);
+    result.gradient = farther.gradient + (here.slope - clear_of_plane_.slope) * toward;
+    result.moment =
+        farther.moment + (here.slope * distance - clear_of_plane_.slope * clear_) * toward * toward.transpose();
     return result.share > 0;
   }
 
@@ -439,6 +440,8 @@ class MeshWall {
   const BoundingVolumeHierarchy* surface_ = nullptr;
   WallFunction plane_{};
   double cell_ = 0;
+  double clear_ = 0;  ///< at a cell's diagonal from the surface no cell is crossed by it
+  WallFunction::ShareAndSlope clear_of_plane_{};
   Vector3<double> origin_ = Vector3<double>::Zero();
   std::array<int, 3> blocks_{};
   std::vector<std::int32_t> block_of_{};
