@@ -80,9 +80,14 @@ int main(int count, char** values) {
     if (advise) {
       experiment.follow_advice(cases);
     }
+    std::vector<example::EffectScore> scores;
+    for (const example::EffectCase& each : cases) {
+      scores.push_back(
+          {example::case_name(each), each.kind, each.scenario, &experiment.result(each), experiment.followed(each)});
+    }
     return example::tell_experiment(
         {"What the model lacks", experiment.recordings(cases), 3, command.reality_mm,
          decant::detail::number_text(command.model_mm) + " mm in the model. What is hidden is not told to the search."},
-        experiment.folder(), example::effect_tables(experiment, cases), command.json_file, command.report_file);
+        experiment.folder(), example::effect_tables(scores), command.json_file, command.report_file);
   });
 }

@@ -147,6 +147,10 @@ inline double strength_of(const std::vector<HiddenEffect>& effects, const char* 
   return strength;
 }
 
+/// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
+/// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
+inline constexpr double spacing_of_strengths = 0.005;
+
 /// Errors that any recording has, within what is declared as tolerated. Of one pour.
 struct ToleratedErrors {
   static constexpr double most_latency = 0.006;  ///< either sign [s]
@@ -180,6 +184,13 @@ struct EffectCase {
     return hidden;
   }
 };
+
+/// "develop_moderate_007"
+inline std::string case_name(const EffectCase& of) {
+  std::string number = std::to_string(of.number);
+  number.insert(0, number.size() < 3 ? 3 - number.size() : 0, '0');
+  return of.range + "_" + of.kind + "_" + number;
+}
 
 inline const char* word(CaseRange range) { return range == CaseRange::Develop ? "develop" : "report"; }
 inline const char* word(CaseKind kind) {

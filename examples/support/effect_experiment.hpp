@@ -43,13 +43,6 @@ struct EffectExperimentOptions {
   bool again = false;  ///< judges anew what is there already
 };
 
-/// "develop_moderate_007"
-inline std::string case_name(const EffectCase& of) {
-  std::string number = std::to_string(of.number);
-  number.insert(0, number.size() < 3 ? 3 - number.size() : 0, '0');
-  return of.range + "_" + of.kind + "_" + number;
-}
-
 /// Makes both recordings of each case and judges them, or finds both in its folder. Runs of the model are kept by
 /// scenario, as all cases of one share most of them.
 class EffectExperiment {

@@ -17,157 +17,14 @@
 
 #include <decant/io/detail/text.hpp>
 
-#include "effect_cases.hpp"
-#include "effect_experiment.hpp"
+#include "effect_score.hpp"
 #include "experiment_report.hpp"
+#include "json_result.hpp"
+#include "three_digits.hpp"
 
 namespace example {
 
-/// How an answer is to be taken.
-enum class AnswerScore {
-  Right,    ///< what is hidden is named, or rightly nothing; an error of measurement may be taken account of unnamed
-  Wrong,    ///< something is named that is not there
-  Half,     ///< one of two that are hidden is named, and nothing else
-  OneOf,    ///< what is hidden is among those that are not told apart
-  Missed,   ///< nothing is said to be missing
-  Abstains  ///< there is a gap that nothing explains: right where something outside of the catalogue is hidden
-};
-
 namespace detail {
-
-/// Effects that count as one name.
-inline std::string family_of(const std::string& name) {
-  static const std::map<std::string, std::string> families{{"drag_linear", "drag"},
-                                                           {"drag_quadratic", "drag"},
-                                                           {"shear_thinning", "viscosity"},
-                                                           {"camera_shift", "camera"},
-                                                           {"camera_roll", "camera"}};
-  const auto found = families.find(name);
-  return found == families.end() ? name : found->second;
-}
-
-inline bool is_measurement(const std::string& family) {
-  static const std::set<std::string> errors{"fill", "latency", "body_pose", "camera", "mask_bias"};
-  return errors.contains(family);
-}
-
-/// A case's result, and what the score needs of it.
-struct EffectScore {
-  const EffectCase* of;
-  const nlohmann::json* result;
-
-  std::string verdict() const { return result->at("verdict"); }
-  /// Families of what is hidden, "nothing" among them.
-  std::set<std::string> truths() const {
-    const nlohmann::json& truth = result->at("truth");
-    std::set<std::string> names{truth.at("family")};
-    if (truth.contains("second")) {
-      names.insert(truth.at("second").at("family"));
-    }
-    return names;
-  }
-  std::string truth() const { return joined(truths(), " + "); }
-  std::string role() const { return result->at("truth").at("role"); }
-  /// Families of what is answered, each once.
-  std::set<std::string> families() const {
-    std::set<std::string> names;
-    for (const auto& name : result->at("effect")) {
-      names.insert(family_of(name));
-    }
-    return names;
-  }
-  /// In one word or several.
-  std::string answer() const {
-    if (verdict() == "nothing" || verdict() == "unexplained") {
-      return verdict();
-    }
-    return joined(families(), verdict() == "one_of" ? " or " : " + ");
-  }
-  /// Whether physics is blamed: something is named that is no error of measurement.
-  bool blames_physics() const {
-    const auto names = families();
-    return (verdict() == "named" || verdict() == "one_of") &&
-           std::any_of(names.begin(), names.end(), [](const auto& name) { return !is_measurement(name); });
-  }
-
-  AnswerScore score() const {
-    const std::set<std::string> names = families();
-    if (verdict() == "unexplained") {
-      return role() == "outside" ? AnswerScore::Right : AnswerScore::Abstains;
-    }
-    if (verdict() == "nothing") {
-      return role() == "nothing" || role() == "measurement" ? AnswerScore::Right : AnswerScore::Missed;
-    }
-    const std::set<std::string> hidden = truths();
-    if (verdict() == "one_of") {
-      const bool among =
-          std::any_of(hidden.begin(), hidden.end(), [&](const auto& each) { return names.contains(each); });
-      return among ? AnswerScore::OneOf : AnswerScore::Wrong;
-    }
-    return names == hidden                                                           ? AnswerScore::Right
-           : std::includes(hidden.begin(), hidden.end(), names.begin(), names.end()) ? AnswerScore::Half
-                                                                                     : AnswerScore::Wrong;
-  }
-  /// Whether more is left than where nothing is missing.
-  bool leaves_a_gap() const { return gap("after") > gap("largest_by_chance"); }
-
-  /// The strength that is found over the hidden one, where the very effect is named and has one number; else NaN.
-  double strength_ratio() const {
-    return comparable() ? number_at(*result, "/strength") / strength_in_model()
-                        : std::numeric_limits<double>::quiet_NaN();
-  }
-  bool interval_holds() const {
-    const double strength = strength_in_model();
-    return number_at(*result, "/interval_90/0") <= strength && strength <= number_at(*result, "/interval_90/1");
-  }
-  bool comparable() const {
-    const std::string hidden = result->at("truth").at("effect");
-    return verdict() == "named" && result->at("effect").size() == 1 && result->at("effect").front() == hidden &&
-           hidden != "shear_thinning" &&  // that of the catalogue thins otherwise
-           result->at("strength").is_number();
-  }
-  double gap(const char* key) const { return number_at(*result, std::string("/gap/") + key); }
-  /// Of what is reducible of the gap of the pour that was not used.
-  double held_out_share() const {
-    return decant::share_of_reducible(gap("held_out_before"), gap("held_out_after"), gap("held_out_noise"),
-                                      gap("held_out_after"));
-  }
-
- private:
-  static std::string joined(const std::set<std::string>& names, const char* between) {
-    std::string text;
-    for (const std::string& name : names) {
-      text += text.empty() ? "" : between;
-      text += name;
-    }
-    return text;
-  }
-
-  /// In the catalogue's unit and from its zero, as what is hidden is said in a case's own. A wall acts on a layer of
-  /// particles the stronger the thinner that is, see spacing_of_strengths.
-  double strength_in_model() const {
-    const nlohmann::json& truth = result->at("truth");
-    const double strength = number_at(truth, "/strength");
-    const double layers = 1e3 * spacing_of_strengths / number_at(*result, "/settings/model_spacing_mm");
-    const std::string name = truth.at("effect");
-    return name == "gravity"         ? 9.81 * (1 + strength)
-           : name == "fill"          ? 1 + strength
-           : name == "wall_friction" ? layers * strength
-           : name == "wall_adhesion" ? layers * layers * strength
-           : name == "inlet_flow"    ? 1 - strength
-           : name == "back_pressure" ? 0.5 * strength  // the mean of beats that are as strong at most
-           : name == "obstacle"      ? (truth.at("unit") == "mm" ? 1e-3 : 1.0) * strength
-                                     : strength;
-  }
-};
-
-inline std::vector<EffectScore> scores_of(const EffectExperiment& experiment, const std::vector<EffectCase>& cases) {
-  std::vector<EffectScore> scores;
-  for (const EffectCase& each : cases) {
-    scores.push_back({&each, &experiment.result(each)});
-  }
-  return scores;
-}
 
 /// Of a share, at 95 % (Wilson 1927), in per cent.
 inline std::string share_interval(std::size_t count, std::size_t of) {
@@ -184,8 +41,8 @@ inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores)
                                 "one of", "missed", "unexplained", "physics blamed"})};
   std::vector<std::string> kinds;
   for (const EffectScore& each : scores) {
-    if (std::find(kinds.begin(), kinds.end(), each.of->kind) == kinds.end()) {
-      kinds.push_back(each.of->kind);
+    if (std::find(kinds.begin(), kinds.end(), each.kind) == kinds.end()) {
+      kinds.push_back(each.kind);
     }
   }
   const std::vector<std::pair<std::string, AnswerScore>> shown{
@@ -199,7 +56,7 @@ inline ExperimentSection answers_by_kind(const std::vector<EffectScore>& scores)
     std::map<AnswerScore, std::size_t> count;
     std::size_t all = 0, physics = 0;
     for (const EffectScore& each : scores) {
-      if (each.of->kind == kind) {
+      if (each.kind == kind) {
         ++all;
         ++count[each.score()];
         physics += each.blames_physics() ? 1 : 0;
@@ -341,7 +198,7 @@ inline ExperimentSection beginnings(const std::vector<EffectScore>& scores) {
                                   number_at(result, "/onset_px/1") - number_at(truth, "/seen_first_px/1"));
     ++cases;
     near += std::abs(late) <= 0.3 && off <= 60 ? 1 : 0;
-    section.table.add({case_name(*each.of), truth.at("effect"), fixed_text(number_at(truth, "/seen_first_s"), 2),
+    section.table.add({each.name, truth.at("effect"), fixed_text(number_at(truth, "/seen_first_s"), 2),
                        pixel(truth.at("seen_first_px")), fixed_text(number_at(result, "/onset_s"), 2),
                        pixel(result.at("onset_px")), fixed_text(late, 2), fixed_text(off, 0)});
   }
@@ -399,15 +256,15 @@ inline ExperimentSection calibration(const std::vector<EffectScore>& scores) {
 }
 
 /// What a further interaction leaves of several effects.
-inline ExperimentSection advised(const EffectExperiment& experiment, const std::vector<EffectCase>& cases) {
+inline ExperimentSection advised(const std::vector<EffectScore>& scores) {
   using decant::detail::fixed_text;
   ExperimentSection section{"One more interaction where several effects are left",
                             decant::Table({"case", "hidden", "left", "advised", "expected [bit]", "answer then",
                                            "drawn by chance", "expected [bit]", "answer then"})};
   std::map<std::string, std::size_t> settled{{"after_advised", 0}, {"after_drawn", 0}}, misled = settled;
   std::size_t asked = 0;
-  for (const EffectCase& each : cases) {
-    const nlohmann::json* followed = experiment.followed(each);
+  for (const EffectScore& each : scores) {
+    const nlohmann::json* followed = each.followed;
     if (followed == nullptr || !followed->contains("after_advised")) {
       continue;
     }
@@ -416,10 +273,10 @@ inline ExperimentSection advised(const EffectExperiment& experiment, const std::
     for (const auto& name : followed->at("left")) {
       left += (left.empty() ? "" : ", ") + name.get<std::string>();
     }
-    std::vector<std::string> row{case_name(each), followed->at("after_advised").at("truth").at("effect"), left};
+    std::vector<std::string> row{each.name, followed->at("after_advised").at("truth").at("effect"), left};
     for (const char* key : {"after_advised", "after_drawn"}) {
       const nlohmann::json& after = followed->at(key);
-      const EffectScore score{&each, &after};
+      const EffectScore score{each.name, each.kind, each.scenario, &after};
       settled[key] += score.verdict() == "named" && score.score() == AnswerScore::Right ? 1 : 0;
       misled[key] += score.verdict() == "named" && score.score() == AnswerScore::Wrong ? 1 : 0;
       row.insert(row.end(), {after.at("interaction"), fixed_text(number_at(after, "/gain_bit"), 2), score.answer()});
@@ -460,7 +317,7 @@ inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
     std::string found = result.contains("strength") ? result.at("strength").dump() : "";
     std::string interval = result.contains("interval_90") ? result.at("interval_90").dump() : "";
     const nlohmann::json& confirmed = result.at("confirmed");
-    section.table.add({case_name(*each.of), std::to_string(each.of->scenario), hidden,
+    section.table.add({each.name, std::to_string(each.scenario), hidden,
                        truth.contains("strength") ? three_digits(truth.at("strength").get<double>()) : "",
                        each.answer(), found, interval, fixed_text(each.gap("before"), 2),
                        fixed_text(each.gap("noise"), 2), fixed_text(each.gap("largest_by_chance"), 2),
@@ -472,19 +329,19 @@ inline ExperimentSection all_cases(const std::vector<EffectScore>& scores) {
 
 }  // namespace detail
 
-inline std::vector<ExperimentSection> effect_tables(const EffectExperiment& experiment,
-                                                    const std::vector<EffectCase>& cases) {
-  const std::vector<detail::EffectScore> scores = detail::scores_of(experiment, cases);
+/// All of them, of one experiment's cases.
+inline std::vector<ExperimentSection> effect_tables(const std::vector<EffectScore>& scores) {
   std::vector<ExperimentSection> sections{detail::answers_by_kind(scores), detail::confusion(scores),
                                           detail::strengths_and_held_out(scores)};
-  if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "outside"; })) {
+  const auto any = [&](auto is) { return std::any_of(scores.begin(), scores.end(), is); };
+  if (any([](const EffectScore& each) { return each.role() == "outside"; })) {
     sections.push_back(detail::beginnings(scores));
   }
-  if (std::any_of(scores.begin(), scores.end(), [](const auto& each) { return each.role() == "two"; })) {
+  if (any([](const EffectScore& each) { return each.role() == "two"; })) {
     sections.push_back(detail::two_at_once(scores));
   }
-  if (std::any_of(cases.begin(), cases.end(), [&](const auto& each) { return experiment.followed(each) != nullptr; })) {
-    sections.push_back(detail::advised(experiment, cases));
+  if (any([](const EffectScore& each) { return each.followed != nullptr; })) {
+    sections.push_back(detail::advised(scores));
   }
   sections.push_back(detail::calibration(scores));
   sections.push_back(detail::all_cases(scores));

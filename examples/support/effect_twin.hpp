@@ -88,10 +88,6 @@ struct EffectRealityParts : RealityParts<PressureSolverType> {
                  decant::SurfaceTension<float>, BackPressure, Stirrer, StickyPatch, Puff, ShakingTable>;
 };
 
-/// Of a wall's friction and adhesion as they are said in a case [m]. The same wall acts on a layer of particles the
-/// stronger the thinner that is: by 1 / spacing (WallFriction) and 1 / spacing^2 (WallAdhesion).
-inline constexpr double spacing_of_strengths = 0.005;
-
 /// Of a reality with what is hidden and what is tolerated.
 inline decant::SimulatorSettings effect_reality_settings(const std::vector<HiddenEffect>& effects,
                                                          const ToleratedErrors& errors, double spacing) {

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
 #include <functional>
 #include <limits>
 #include <map>
@@ -28,6 +27,7 @@
 #include "liquid_run.hpp"
 #include "result_file.hpp"
 #include "sweep_executor.hpp"
+#include "three_digits.hpp"
 
 namespace example {
 
@@ -231,13 +231,6 @@ inline LiquidFit fit_liquid(LiquidRuns& learn, LiquidRuns& held_out, const Liqui
 
 inline std::string to_string(decant::SearchEnd end) {
   return end == decant::SearchEnd::Found ? "found" : end == decant::SearchEnd::Budget ? "budget" : "nothing works";
-}
-
-/// Three digits, for people.
-inline std::string three_digits(double value) {
-  char buffer[32];
-  std::snprintf(buffer, sizeof buffer, "%.3g", value);
-  return buffer;
 }
 
 /// What is known of a parameter, in words.

@@ -26,7 +26,7 @@
 #include <decant/io/table.hpp>
 
 #include "json_result.hpp"
-#include "liquid_fit.hpp"
+#include "three_digits.hpp"
 
 namespace example {
 
