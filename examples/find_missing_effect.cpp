@@ -139,9 +139,13 @@ int main(int count, char** values) {
       options.planned = false;
       return interactions;
     };
-    Interactions learn = interactions_of(learn_folders), held_out = interactions_of(held_out_folders),
-                 references = interactions_of(reference_folders), proposed = interactions_of(proposed_folders, true);
+    Interactions learn = interactions_of(learn_folders);
     const std::vector<decant::Effect>& effects = kept.front()->model.effects();
+    for (const decant::Effect& effect : effects) {
+      options.elsewhere.insert(effect.name);
+    }
+    Interactions held_out = interactions_of(held_out_folders), references = interactions_of(reference_folders),
+                 proposed = interactions_of(proposed_folders, true);
     for (const decant::Interaction<example::RecordedModel>& each : proposed) {
       example::expect_same_effects(effects, each.model->effects(), each.name);
     }

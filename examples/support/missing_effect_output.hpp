@@ -197,8 +197,7 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
 inline std::string references_sentence(std::size_t references, const decant::MissingEffect& result) {
   if (references == 0) {
     return "There are no references: how far reality is from the model where nothing is missing is not known, and "
-           "taken "
-           "to be little more than how far its own runs are from each other.";
+           "taken to be little more than how far its own runs are from each other.";
   }
   const std::string count = std::to_string(references) + (references == 1 ? " reference" : " references");
   return result.taught_by > 0

@@ -49,6 +49,8 @@ struct InteractionOptions {
   decant::SimulatedInteractionSettings model{};
   std::map<std::string, double> tolerances{};  ///< by effect: of each of its components, in place of the catalogue's
   std::set<std::string> without{};             ///< effects that are known not to be missing, beyond their tolerances
+  std::set<std::string> elsewhere{};           ///< effects that other recordings of a search can have: to name them in
+                                               ///< tolerances or without is no mistake where one cannot
   std::map<std::string, double> reading_errors{};  ///< see recorded_sensors
   /// Kinds of sensors that may show too much or too little: the same for all recordings of a search, see
   /// uncertain_gains.
@@ -463,7 +465,7 @@ inline RecordedInteraction interaction_of(decant::Recording recording, const Int
         apply(effect);
       }
     }
-    if (!found) {
+    if (!found && !options.elsewhere.contains(name)) {
       throw std::runtime_error(option + " '" + name + "': expected an effect of the catalogue of " + recording.name);
     }
   };

@@ -150,6 +150,26 @@ TEST_CASE("measured scene: effects of another container are known by the words o
   CHECK(words(interaction("alone", scene("beaker", "bowl"))) != known);
 }
 
+TEST_CASE("measured scene: a tolerance for what another recording can have is no mistake, a misspelt one is") {
+  example::InteractionOptions options;
+  const auto names = [&] {
+    const example::RecordedInteraction alone = interaction("alone", scene_text(0.064), options);
+    std::vector<std::string> result;
+    for (const Effect& effect : alone.model.effects()) {
+      result.push_back(effect.name);
+    }
+    return result;
+  };
+  const std::vector<std::string> known = names();
+  REQUIRE(std::count(known.begin(), known.end(), "obstacle") == 0);  // nothing is poured
+  options.tolerances = {{"obstacle", 0.002}};
+  CHECK_THROWS_WITH(names(), decant_test::contains("tolerance of 'obstacle': expected an effect"));
+  options.elsewhere = {"obstacle"};
+  CHECK(names() == known);
+  options.without = {"obstacle", "gravty"};
+  CHECK_THROWS_WITH(names(), decant_test::contains("without 'gravty': expected an effect"));
+}
+
 TEST_CASE("measured scene: what cannot be one is refused") {
   const decant_test::TemporaryFolder folder("scene_interaction_refuses");
   folder.write("scene.json", scene_text(0.064, R"(, "composition": "paper")"));
