@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -38,7 +39,7 @@ AnswerScore scored(const Json& truth, const std::string& verdict, const std::vec
   return score_of(result).score();
 }
 
-/// A leak of 20 ml/s that is named with a strength and an interval of 90 %.
+/// What is hidden is named, with a strength and an interval of 90 %.
 Json named(Json truth, double strength, double low, double high) {
   Json result = answer(truth, "named", {truth.at("effect")});
   result["strength"] = strength;

@@ -547,6 +547,9 @@ elseif(CASE STREQUAL "find_missing_effect_advises")
   run(2 --learn front --propose "${SOURCE}/examples/data/pour_cup" --frames-per-second 50 --reading-error
       level_mm=4,front_mm=4 --draws 8)
   expect_one_line("${errors}" "--propose.*pour_cup.*bodies")
+  # nor a column a pour, but a tolerance for what a pour alone can have is no mistake
+  run(2 --learn "${SOURCE}/examples/data/pour_cup" --propose front --tolerance obstacle=0.002)
+  expect_one_line("${errors}" "--propose.*front.*bodies")
 
 elseif(CASE STREQUAL "find_missing_effect_refuses")
   set(pour "${SOURCE}/examples/data/pour_cup")
