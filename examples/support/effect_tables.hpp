@@ -149,6 +149,12 @@ inline ExperimentSection strengths_and_held_out(const std::vector<EffectScore>& 
       share.size());
   add("... better than the best rival there", std::to_string(better), rivals);
   add("wrongly named: not confirmed", std::to_string(caught), wrong);
+  section.json = {{"strengths", off.size()}, {"strength_off_by_median", number_json(median_of(off))},
+                  {"interval_holds", held},  {"rightly_named", right},
+                  {"confirmed", confirmed},  {"not_testable", not_testable},
+                  {"refuted", refuted},      {"held_out_share_median", number_json(median_of(share))},
+                  {"rivals", rivals},        {"better_than_rival", better},
+                  {"wrongly_named", wrong},  {"caught", caught}};
   return section;
 }
 

@@ -196,3 +196,88 @@ TEST_CASE("Where something begins counts where it is somewhere, within 0.3 s and
   CHECK(told.at("cases") == 3);
   CHECK(told.at("within_0.3_s_and_60_px") == 1);
 }
+
+TEST_CASE("Strengths and the pour that was not used are told of rightly named effects, wrong ones if they are caught",
+          "[examples][effect_score]") {
+  const auto leak = [](double strength, double low, double high, Json confirmed, double before, double after,
+                       double rival) {
+    Json truth = truth_of("leak", "leak");
+    truth["strength"] = 20.0;
+    truth["unit"] = "ml/s";
+    Json result = named(truth, strength, low, high);
+    result["confirmed"] = std::move(confirmed);
+    result["gap"] = {{"held_out_before", before},
+                     {"held_out_after", after},
+                     {"held_out_noise", 1.0},
+                     {"best_rival_held_out", rival}};
+    return result;
+  };
+  const auto wrong = [](Json confirmed) {
+    Json result = answer(truth_of("leak", "leak"), "named", {"suction"});
+    result["confirmed"] = std::move(confirmed);
+    return result;
+  };
+  const std::vector<Json> results{leak(22, 18, 26, true, 11, 2, 9),                 // 0.9 of 10 reducible
+                                  leak(19, 18, 19.5, true, 6, 3, 2.5),              // 0.6 of 5
+                                  leak(16, 14, 17, "not_testable", 1.1, 1.0, 1.0),  // of no use there
+                                  leak(21, 17, 25, false, 3, 3, 4),
+                                  wrong(true),
+                                  wrong(false),
+                                  wrong("not_testable")};
+  const Json told = example::detail::strengths_and_held_out(scores_of(results)).json;
+  CHECK(told.at("strengths") == 4);
+  CHECK(told.at("strength_off_by_median").get<double>() == Approx(0.075));  // of 0.05, 0.05, 0.1, 0.2
+  CHECK(told.at("interval_holds") == 2);
+  CHECK(told.at("rightly_named") == 4);
+  CHECK(told.at("confirmed") == 2);
+  CHECK(told.at("not_testable") == 1);
+  CHECK(told.at("refuted") == 1);
+  CHECK(told.at("held_out_share_median").get<double>() == Approx(0.6));  // of 0.9, 0.6, 0
+  CHECK(told.at("rivals") == 3);
+  CHECK(told.at("better_than_rival") == 2);
+  CHECK(told.at("wrongly_named") == 3);
+  CHECK(told.at("caught") == 2);
+}
+
+TEST_CASE("Of two effects at once it is told what becomes of the second one", "[examples][effect_score]") {
+  Json truth = truth_of("leak", "leak", "two");
+  truth["second"] = truth_of("viscosity", "viscosity");
+  const auto found = [&](const std::string& verdict, const std::vector<std::string>& effects, double after) {
+    Json result = answer(truth, verdict, effects);
+    result["gap"] = {{"after", after}, {"largest_by_chance", 3.0}};
+    return result;
+  };
+  const std::vector<Json> results{found("named", {"leak", "viscosity"}, 2), found("named", {"leak"}, 4),
+                                  found("named", {"leak"}, 2.5), found("unexplained", {}, 8),
+                                  answer(truth_of("leak", "leak"), "named", {"leak"})};
+  const Json told = example::detail::two_at_once(scores_of(results)).json;
+  CHECK(told == Json{{"cases", 4}, {"both", 1}, {"one_and_rest_told", 1}, {"one", 1}, {"unexplained", 1}});
+}
+
+TEST_CASE("Advice is counted beside chance by how often one effect is left, the right one or a wrong one",
+          "[examples][effect_score]") {
+  const Json leak = truth_of("leak", "leak");
+  const auto after = [&](const std::string& verdict, const std::vector<std::string>& effects) {
+    Json result = answer(leak, verdict, effects);
+    result["interaction"] = "slower";
+    result["gain_bit"] = 0.5;
+    return result;
+  };
+  const auto followed = [&](const Json& advised, const Json& drawn) {
+    return Json{{"left", {"leak", "suction"}}, {"after_advised", advised}, {"after_drawn", drawn}};
+  };
+  const std::vector<Json> results(3, answer(leak, "one_of", {"leak", "suction"}));
+  const std::vector<Json> then{followed(after("named", {"leak"}), after("one_of", {"leak", "suction"})),
+                               followed(after("named", {"suction"}), after("named", {"leak"})),
+                               {{"left", {"leak", "suction"}}}};  // not followed yet
+  std::vector<EffectScore> scores = scores_of(results);
+  for (std::size_t k = 0; k < then.size(); ++k) {
+    scores[k].followed = &then[k];
+  }
+  const Json told = example::detail::advised(scores).json;
+  CHECK(told == Json{{"cases", 2},
+                     {"settled_by_advice", 1},
+                     {"settled_by_chance", 1},
+                     {"misled_by_advice", 1},
+                     {"misled_by_chance", 0}});
+}
