@@ -22,7 +22,7 @@ int main(int count, char** values) {
   example::CaseRange range = example::CaseRange::Develop;
   std::vector<std::string> kinds{"nothing", "moderate", "weak", "outside", "measurement"};
   int first = 0, most = 1000;
-  bool advise = false;
+  bool advise = false, answered = false;
   std::vector<std::size_t> scenarios;
   example::EffectExperimentOptions options;
   example::ExperimentCommand command(options.recording.longest, options.recording.spacing, options.model.model.spacing);
@@ -47,6 +47,7 @@ int main(int count, char** values) {
   app.add_flag("--advise", advise,
                "where several effects are left, has another interaction recorded, one that is advised and one that is "
                "drawn by chance, and judges again");
+  app.add_flag("--answered", answered, "only cases that have been answered before: tables of what is there");
   app.add_flag("--both", options.both, "learns from both pours of a case, and holds out none");
   app.add_option("--draws", options.search.dictionary.draws,
                  "runs with all that is tolerated drawn, to know what chance does")
@@ -76,6 +77,9 @@ int main(int count, char** values) {
     // one scenario after the other: what is stopped has few dictionaries of runs begun
     std::stable_sort(cases.begin(), cases.end(), [](const auto& a, const auto& b) { return a.scenario < b.scenario; });
     example::EffectExperiment experiment(options);
+    if (answered) {
+      std::erase_if(cases, [&](const example::EffectCase& each) { return !experiment.is_answered(each); });
+    }
     experiment.run(cases);
     if (advise) {
       experiment.follow_advice(cases);

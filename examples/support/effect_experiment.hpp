@@ -68,6 +68,8 @@ class EffectExperiment {
     folder_.run("finding effects", jobs, true);  // the runs for one are made side by side
   }
 
+  bool is_answered(const EffectCase& of) const { return folder_.results().contains(key(of)); }
+
   /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
   const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
 
