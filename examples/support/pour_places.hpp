@@ -35,37 +35,31 @@ struct Inside {
   decant::Vector3<double> mouth() const { return middle + (rim - middle.dot(up)) * up; }
 };
 
-/// A body's inside as it holds most: with one of its own axes upright, as it is made, or as it stands at first.
-/// Recordings may begin with a container that is tilted already. Nothing if it holds nothing.
+/// A body's inside, see upright_cavity: recordings may begin with a container that is tilted already. Nothing if it
+/// holds nothing.
 inline std::optional<Inside> inside_of(const decant::recording::Body& body,
                                        const decant::Vector3<double>& up_at_first) {
   using namespace decant;
   const auto surface = std::make_shared<const BoundingVolumeHierarchy>(body.mesh);
-  std::optional<Inside> best;
-  for (const Vector3<double>& up :
-       {Vector3<double>(0, 0, 1), Vector3<double>(0, 1, 0), Vector3<double>(1, 0, 0), Vector3<double>(0, 0, -1),
-        Vector3<double>(0, -1, 0), Vector3<double>(-1, 0, 0), up_at_first}) {
-    const Cavity cavity(surface, up);
-    // a little more by chance is no reason to take another axis
-    if (cavity.empty() || (best && cavity.volume() <= 1.02 * best->volume)) {
-      continue;
-    }
-    Inside& inside = best.emplace();
-    inside.up = up;
-    inside.volume = cavity.volume();
-    inside.middle = surface->bounds().center();
-    inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(up)) * up;
-    inside.rim = cavity.rim_height();
-    constexpr int slices = 20;
-    const double thick = (inside.rim - cavity.bottom_height()) / slices;
-    for (int k = 0; k < slices && thick > 0; ++k) {
-      const double top = inside.rim - k * thick;
-      const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
-      inside.rim_area = k == 0 ? area : inside.rim_area;
-      inside.widest_area = std::max(inside.widest_area, area);
-    }
+  const Cavity cavity = upright_cavity(surface, up_at_first);
+  if (cavity.empty()) {
+    return std::nullopt;
   }
-  return best;
+  Inside inside;
+  inside.up = cavity.up();
+  inside.volume = cavity.volume();
+  inside.middle = surface->bounds().center();
+  inside.floor = inside.middle + (cavity.bottom_height() - inside.middle.dot(inside.up)) * inside.up;
+  inside.rim = cavity.rim_height();
+  constexpr int slices = 20;
+  const double thick = (inside.rim - cavity.bottom_height()) / slices;
+  for (int k = 0; k < slices && thick > 0; ++k) {
+    const double top = inside.rim - k * thick;
+    const double area = (cavity.volume_below(top) - cavity.volume_below(top - thick)) / thick;
+    inside.rim_area = k == 0 ? area : inside.rim_area;
+    inside.widest_area = std::max(inside.widest_area, area);
+  }
+  return inside;
 }
 
 /// The point of a container's rim that gets lowest, in its own frame and in the world as it then is.

@@ -129,19 +129,23 @@ void fill_as_recorded(const decant::Recording& recording, double factor, Model& 
   if (!recording.liquid.initial) {
     return;
   }
-  using decant::FillAmount;
   const auto& initial = *recording.liquid.initial;
   decant::expects(initial.known(), "track: initial amount of liquid", "given in the recording", "none");
   const auto body = static_cast<decant::BodyId>(initial.body);
-  FillAmount amount = initial.fill_fraction ? FillAmount::fraction(std::min(factor * *initial.fill_fraction, 1.0))
-                                            : FillAmount::volume(factor * *initial.volume);
-  if (!initial.fill_fraction && factor > 1) {
-    const auto& container = model.bodies()[body];
-    const decant::Vector3<double> up = -(container.motion.at(model.time()).rotation.conjugate() * recording.gravity);
-    amount.value = std::min(amount.value, std::max(*initial.volume, decant::Cavity(container.surface, up).volume()));
+  const auto& container = model.bodies()[body];
+  const decant::Vector3<double> up = -(container.motion.at(model.time()).rotation.conjugate() * recording.gravity);
+  // A fraction is of what it holds upright, wherever the recording begins. What does not fit as it stands has run out
+  // before; a volume that is told is there, or else refused.
+  const double told = initial.fill_fraction
+                          ? *initial.fill_fraction * decant::upright_cavity(container.surface, up).volume()
+                          : *initial.volume;
+  double volume = factor * told;
+  if (initial.fill_fraction || factor > 1) {
+    const double holds = decant::Cavity(container.surface, up).volume();
+    volume = std::min(volume, initial.fill_fraction ? holds : std::max(told, holds));
   }
-  if (amount.value > 0) {
-    decant::fill(model, body, amount);
+  if (volume > 0) {
+    decant::fill(model, body, decant::FillAmount::volume(volume));
   }
 }
 

@@ -69,6 +69,27 @@ TEST_CASE("a tilted cylinder holds what is below its lowest rim") {
   REQUIRE(Cavity(surface, -Point::UnitZ()).volume() < 1e-9);
 }
 
+TEST_CASE(
+    "what a tilted container holds upright is known by its frame's axes, or as it stands if its frame is another") {
+  const double r = 0.032, h = 0.10, all = pi * r * r * h;
+  const TriangleMesh along_z = decant::CylinderInside{r, h, 0.003, Face::PositiveZ}.mesh();
+  const auto held = [](const TriangleMesh& mesh, const Point& up_now) {
+    return decant::upright_cavity(std::make_shared<const decant::BoundingVolumeHierarchy>(mesh), up_now);
+  };
+  const Point tilted(std::sin(0.6), 0, std::cos(0.6));  // holds four fifths so
+  CHECK(held(along_z, tilted).volume() == Approx(all).epsilon(3e-3));
+  CHECK(held(along_z, tilted).up().isApprox(Point::UnitZ()));
+  TriangleMesh along_y = along_z, askew = along_z;
+  for (std::size_t k = 0; k < along_z.vertices.size(); ++k) {
+    const Point& x = along_z.vertices[k];
+    along_y.vertices[k] = Point(x.y(), x.z(), x.x());
+    askew.vertices[k] = Eigen::AngleAxisd(0.6, Point::UnitY()) * x;
+  }
+  CHECK(held(along_y, Point(0, std::cos(0.6), std::sin(0.6))).volume() == Approx(all).epsilon(3e-3));
+  CHECK(held(askew, tilted).volume() == Approx(all).epsilon(3e-3));
+  CHECK(held(decant::Sphere{}.mesh(), tilted).empty());
+}
+
 TEST_CASE("closed vessels are cavities as a whole and solids are none") {
   const double r = 0.05, h = 0.1;
   for (const Point& up : {Point(0, 0, 1), Point(0.3, 0.2, -0.5)}) {

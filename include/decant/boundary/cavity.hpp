@@ -528,4 +528,20 @@ inline void Cavity::choose(const Pieces& pieces) {
   }
 }
 
+/// A container's cavity as it holds most: with one of its frame's axes upright, as it is made, or as it stands now, if
+/// that holds more. So what a container holds is known of one that is tilted, too. Empty if it holds nothing.
+/// @param up_now any length but 0, in the body's frame.
+inline Cavity upright_cavity(const std::shared_ptr<const BoundingVolumeHierarchy>& surface,
+                             const Vector3<double>& up_now = Vector3<double>::UnitZ()) {
+  Cavity most(surface, Vector3<double>(0, 0, 1));
+  for (const Vector3<double>& up : {Vector3<double>(0, 1, 0), Vector3<double>(1, 0, 0), Vector3<double>(0, 0, -1),
+                                    Vector3<double>(0, -1, 0), Vector3<double>(-1, 0, 0), up_now}) {
+    Cavity other(surface, up);
+    if (other.volume() > 1.02 * most.volume()) {  // a little more by chance is no reason to take another axis
+      most = std::move(other);
+    }
+  }
+  return most;
+}
+
 }  // namespace decant::inline DECANT_TARGET
