@@ -295,7 +295,7 @@ TEST_CASE("readings: a run that does not predict them counts as failed, unless t
   blind.blind_below = 1;
   const Interaction<BlindTankModel> nothing_known{"a", &blind, read_from({}, 11)};
   CHECK_THROWS_WITH(MissingEffectSearch<BlindTankModel>({nothing_known}, {}, run_jobs_on(executor)).find(),
-                    decant_test::contains("baselines that worked"));
+                    decant_test::contains("model of 'a' as it is that come to their end"));
 }
 
 namespace {

@@ -17,6 +17,7 @@
 
 #include <Eigen/Core>
 
+#include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/discovery/disagreement.hpp>
 #include <decant/discovery/effect.hpp>
@@ -169,22 +170,21 @@ class RecordingComparison {
   ComparedRecordings operator()(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
                                 const DictionarySettings& settings, const std::vector<AppliedEffect>& added = {}) {
     const std::vector<PlannedRun> plan = plan_dictionary(effects, settings, added);
-    std::vector<Run> runs;
-    for (const Interaction<Model>& each : of) {
-      for (const PlannedRun& planned : plan) {
-        runs.emplace_back(&each, planned.run);
-      }
-    }
-    const std::vector<Observation> seen = (*runs_)(runs);
     ComparedRecordings known;
     known.effects = effects;
     for (std::size_t k = 0; k < effects.size(); ++k) {
       known.number.push_back(k);
     }
+    known.dictionary.assign(of.size(), {effects, {}, {}});
+    // the model as it is before all else: where it does not work, nobody has to wait for the others
+    const auto others = plan.begin() + settings.baselines;
+    run({plan.begin(), others}, of, known);
     for (std::size_t k = 0; k < of.size(); ++k) {
-      const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
-      known.dictionary.push_back({effects, plan, {begin, begin + static_cast<std::ptrdiff_t>(plan.size())}});
+      expects(!known.dictionary[k].of_role(RunRole::Baseline).empty(),
+              "MissingEffectSearch: runs of the model of '" + of[k].name + "' as it is that come to their end",
+              "at least one", "none");
     }
+    run({others, plan.end()}, of, known);
     compare(of, known);
     const std::vector<PlannedRun> repeats = repeats_of_faint(known, settings);
     if (!repeats.empty()) {
@@ -237,6 +237,15 @@ class RecordingComparison {
   /// Makes more runs of each interaction, and compares its recording with all that there are then.
   void extend(const std::vector<Interaction<Model>>& of, const std::vector<PlannedRun>& plan,
               ComparedRecordings& known) {
+    for (EffectDictionary& dictionary : known.dictionary) {
+      dictionary.effects = known.effects;
+    }
+    run(plan, of, known);
+    compare(of, known);
+  }
+
+  /// Adds more runs of each interaction to its dictionary.
+  void run(const std::vector<PlannedRun>& plan, const std::vector<Interaction<Model>>& of, ComparedRecordings& known) {
     std::vector<Run> runs;
     for (const Interaction<Model>& each : of) {
       for (const PlannedRun& planned : plan) {
@@ -246,12 +255,10 @@ class RecordingComparison {
     const std::vector<Observation> seen = (*runs_)(runs);
     for (std::size_t k = 0; k < of.size(); ++k) {
       EffectDictionary& dictionary = known.dictionary[k];
-      dictionary.effects = known.effects;
       dictionary.runs.insert(dictionary.runs.end(), plan.begin(), plan.end());
       const auto begin = seen.begin() + static_cast<std::ptrdiff_t>(k * plan.size());
       dictionary.seen.insert(dictionary.seen.end(), begin, begin + static_cast<std::ptrdiff_t>(plan.size()));
     }
-    compare(of, known);
   }
 
   /// Recordings with dictionaries.

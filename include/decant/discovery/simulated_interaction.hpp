@@ -290,9 +290,11 @@ class SimulatedInteraction {
     std::vector<double> first_read(scene_.sensors.size()), read(scene_.sensors.size());
     const double start = model.time() - scene_.times.front() - changes.start_delay;
     for (std::size_t frame = 0; frame < scene_.times.size(); ++frame) {
-      const double until = start + scene_.times[frame];
-      while (model.time() < until - 1e-9) {
-        if (!model.step(std::min(settings_.longest_step, until - model.time())).advanced()) {
+      // in equal steps: of stamps that are rounded, whole ones would leave next to nothing for the last one
+      const double gap = start + scene_.times[frame] - model.time();
+      const double steps = std::max(1.0, std::ceil(gap / settings_.longest_step - 1e-3));
+      for (int step = 0; gap > 1e-9 && step < static_cast<int>(steps); ++step) {
+        if (!model.step(gap / steps).advanced()) {
           return false;
         }
       }
