@@ -279,11 +279,11 @@ class ComplementaritySolver {
             const Scalar slope = squared_step * system.diagonal()[own];
             residual_[own] = left;
             if (slope > smallest_slope_) {
+              partial.add(std::max(left, std::min(-left, term[own] * slope)));
               // What has come loose is to lose its pressure, and asks for no more: room that it has is none that has
               // to be filled. In a short sub-step that would take a pull, and a push by those around it, without
               // bounds.
-              residual_[own] = std::max(left, -term[own] * slope);
-              partial.add(std::abs(residual_[own]));
+              residual_[own] = term[own] > 0 ? std::max(left, -term[own] * slope) : left;
               contact_[own] = term[own] > 0 || left > 0 ? Scalar(1) : Scalar(0);
             } else {
               // Feels neither neighbours nor walls: no pressure changes what is left here, and the pressure it has is
