@@ -64,7 +64,7 @@ class ComplementaritySolver {
                               std::vector<Scalar>& term) noexcept {
     const Index count = step.fluid.size();
     const auto n = static_cast<std::size_t>(count);
-    for (auto* values : {&residual_, &direction_, &image_, &contact_, &smooth_}) {
+    for (auto* values : {&residual_, &asked_, &direction_, &image_, &contact_, &smooth_}) {
       values->resize(n);
     }
     sum_.resize(4 * n);
@@ -90,7 +90,7 @@ class ComplementaritySolver {
     int steps_by_grid = 0;
     const auto judge = [&](const Progress& progress) {
       report.error = progress.amiss / (rest_density * static_cast<double>(count));
-      net_ = grid_.restrict(residual_, contact_, step.threads);
+      net_ = grid_.restrict(asked_, contact_, step.threads);
       particles_done = progress.amiss <= allowed && progress.largest <= largest_allowed;
       report.converged = particles_done && net_ <= net_allowed;
       return report.converged;
@@ -221,6 +221,15 @@ class ComplementaritySolver {
         [](double a, double b) { return a + b; });
   }
 
+  /// What of a residual regions have to answer for. A particle that has come loose is to lose its pressure, and no
+  /// more: the room that it has then is none that those around it have to fill. Were it asked for, all would be pushed
+  /// for one, and in a frame of a microsecond at any speed.
+  template <class Number>
+  [[gnu::always_inline]] static Number asked(Number left, Number pressure, Number slope) noexcept {
+    const Number zero(Scalar(0));
+    return select(pressure > zero, maximum(left, zero - pressure * slope), left);
+  }
+
   /// The next direction, from image_ and `keep` times the last one.
   template <class Step>
   void turn(const Step& step, Scalar keep) noexcept {
@@ -280,15 +289,12 @@ class ComplementaritySolver {
             residual_[own] = left;
             if (slope > smallest_slope_) {
               partial.add(std::max(left, std::min(-left, term[own] * slope)));
-              // What has come loose is to lose its pressure, and asks for no more: room that it has is none that has
-              // to be filled. In a short sub-step that would take a pull, and a push by those around it, without
-              // bounds.
-              residual_[own] = term[own] > 0 ? std::max(left, -term[own] * slope) : left;
+              asked_[own] = asked(left, term[own], slope);
               contact_[own] = term[own] > 0 || left > 0 ? Scalar(1) : Scalar(0);
             } else {
               // Feels neither neighbours nor walls: no pressure changes what is left here, and the pressure it has is
               // from a place where it had company. In contact, it would hold up the others for ever.
-              residual_[own] = term[own] = contact_[own] = 0;
+              residual_[own] = asked_[own] = term[own] = contact_[own] = 0;
             }
             for (std::size_t axis = 0; axis < 4; ++axis) {
               sum_[4 * own + axis] = system.accelerations()[4 * own + axis];
@@ -346,6 +352,7 @@ class ComplementaritySolver {
             store_as(left, &residual_[at]);
             const Number slope = Number(squared_step) * load_as<Number>(&system.diagonal()[at]);
             const Number pull = zero - pressure * slope;  // of a negative pressure, which will be clipped
+            store_as(asked(left, pressure, slope), &asked_[at]);
             const auto negative = pressure < zero;
             // particles out of contact stay out until the next start
             const auto touched =
@@ -385,6 +392,7 @@ class ComplementaritySolver {
   int impatient_steps_ = 0;  ///< sub-steps in which the grid is called at once
   double net_ = 0;           ///< what regions are amiss by as a whole, summed over the grid's nodes [kg/m^3]
   std::vector<Scalar> residual_{}, direction_{}, image_{};
+  std::vector<Scalar> asked_{};    ///< see asked
   std::vector<Scalar> contact_{};  ///< 1 or 0
   std::vector<Scalar> smooth_{};   ///< the grid's part of what residual_ asks for
   std::vector<Scalar> sum_{};      ///< accelerations by `term`, records as the system's
