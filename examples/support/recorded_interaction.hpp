@@ -120,7 +120,7 @@ inline std::string fingerprint(const std::vector<std::string>& sources, const Re
       hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211U;
     }
   };
-  add("2");  // one more whenever the same words come to mean other predictions
+  add("3");  // one more whenever the same words come to mean other predictions
   for (const std::string& each : sources) {
     add(each);
   }

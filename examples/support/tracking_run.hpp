@@ -122,8 +122,8 @@ struct TrackingParts : decant::DefaultParts<float> {
 };
 using TrackingModel = decant::Simulator<TrackingParts>;
 
-/// The initial amount of liquid that a recording says, times a factor, at most a full container. Throws
-/// std::invalid_argument if the recording does not know it, or says more than the container holds.
+/// The initial amount of liquid that a recording says, times a factor, at most what the container holds as it stands.
+/// Throws std::invalid_argument if the recording does not know it, or says a volume that is more than that.
 template <class Model>
 void fill_as_recorded(const decant::Recording& recording, double factor, Model& model) {
   if (!recording.liquid.initial) {
