@@ -59,16 +59,13 @@ class EffectExperiment {
   void run(const std::vector<EffectCase>& cases) {
     std::vector<ExperimentJob> jobs;
     for (const EffectCase& each : cases) {
-      ExperimentJob& job = jobs.emplace_back(ExperimentJob{key(each), settings_json(each), recordings_of(each, {0, 1}),
-                                                           [this, each](const auto&) { return judge(each); }});
-      for (int k = 0; k < options_.references; ++k) {
-        job.recordings.push_back(reference(each, k));
-      }
+      jobs.push_back(job(each));
     }
     folder_.run("finding effects", jobs, true);  // the runs for one are made side by side
   }
 
-  bool is_answered(const EffectCase& of) const { return folder_.results().contains(key(of)); }
+  /// Whether run() finds its result there.
+  bool is_answered(const EffectCase& of) { return folder_.is_computed(job(of)); }
 
   /// Of a case that was run, as missing_effect_json has it, with the truth beside it; others are an std::out_of_range.
   const nlohmann::json& result(const EffectCase& of) const { return folder_.result(key(of)); }
@@ -119,6 +116,15 @@ class EffectExperiment {
     decant::Journal journal;
     std::size_t computed = 0;  ///< the others were there
   };
+
+  ExperimentJob job(const EffectCase& of) {
+    ExperimentJob job{key(of), settings_json(of), recordings_of(of, {0, 1}),
+                      [this, of](const auto&) { return judge(of); }};
+    for (int k = 0; k < options_.references; ++k) {
+      job.recordings.push_back(reference(of, k));
+    }
+    return job;
+  }
 
   std::string solver() const {
     return options_.recording.solver == RealitySolver::DivergenceFree ? "" : "_position_based";

@@ -85,8 +85,7 @@ class ExperimentFolder {
         continue;
       }
       ++asked_;
-      nlohmann::json kept = again_ ? nlohmann::json() : read_kept(job.key);
-      if (kept.is_object() && kept.value("settings", nlohmann::json()) == job.settings) {
+      if (nlohmann::json kept = again_ ? nlohmann::json() : read_kept(job); kept.is_object()) {
         results_[job.key] = std::move(kept);
       } else {
         missing.push_back(&job);
@@ -110,6 +109,9 @@ class ExperimentFolder {
     });
     computed_ += missing.size();
   }
+
+  /// Whether a result of the job is there, from this run or an earlier one.
+  bool is_computed(const ExperimentJob& job) const { return results_.contains(job.key) || read_kept(job).is_object(); }
 
   /// Of a job that was run; other keys are an std::out_of_range.
   const nlohmann::json& result(const std::string& key) const { return results_.at(key); }
@@ -182,12 +184,16 @@ class ExperimentFolder {
 
   std::filesystem::path results_folder() const { return folder_ / "results"; }
 
-  nlohmann::json read_kept(const std::string& key) const {
-    const std::filesystem::path file = results_folder() / (key + ".json");
+  /// What an earlier run computed with the job's settings; null where there is none.
+  nlohmann::json read_kept(const ExperimentJob& job) const {
+    const std::filesystem::path file = results_folder() / (job.key + ".json");
     std::error_code error;
-    return std::filesystem::is_regular_file(file, error)
-               ? nlohmann::json::parse(decant::detail::read_text_file(file, std::size_t{1} << 26), nullptr, false)
-               : nlohmann::json();
+    if (!std::filesystem::is_regular_file(file, error)) {
+      return {};
+    }
+    nlohmann::json kept =
+        nlohmann::json::parse(decant::detail::read_text_file(file, std::size_t{1} << 26), nullptr, false);
+    return kept.is_object() && kept.value("settings", nlohmann::json()) == job.settings ? kept : nlohmann::json();
   }
 
   void expect_made_as(const ExperimentRecording& wanted) const {

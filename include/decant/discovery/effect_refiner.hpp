@@ -182,10 +182,11 @@ class EffectRefiner {
   static bool may_be_several(const Effect& effect) { return effect.place || effect.window; }
 
   /// Those that are looked at closely: of one answer the best effect, and of one that may be in several places, or at
-  /// several times, two of them, by evidence. What lasts for a while explains more by chance than what lasts. Where
-  /// what an effect does is bent, as a front's is that comes later, a curve through few runs promises less than one of
-  /// them has: answers that come near the best by such a run are looked at from there on, although no curve has them
-  /// among the best.
+  /// several times, two of them, by evidence. What lasts for a while explains more by chance than what lasts. Answers
+  /// that chance does not tell from the best of these by their curves are rivals all the same, up to as many more.
+  /// Where what an effect does is bent, as a front's is that comes later, a curve through few runs promises less than
+  /// one of them has: answers that come near the best by such a run are looked at from there on, although no curve has
+  /// them among the best.
   std::vector<Candidate> chosen(const Judgement& judgement, const ComparedRecordings& known,
                                 const std::vector<RefinedEffect>& found) const {
     struct Instance {
@@ -216,13 +217,22 @@ class EffectRefiner {
     std::map<std::string, std::size_t> taken;
     std::vector<Candidate> result;
     double best = judgement.distance;
+    const auto most = static_cast<std::size_t>(settings_.refined);
     for (const std::string& answer : order) {
       const std::vector<Instance>& instances = of_answer[answer];
       const std::size_t next = taken[answer];
-      if (result.size() < static_cast<std::size_t>(settings_.refined) && next < instances.size() &&
+      if (result.size() < most && next < instances.size() &&
           next < (may_be_several(known.effects[instances[next].candidate.judged]) ? 2U : 1U)) {
         best = std::min(best, instances[next].distance);
         result.push_back(instances[next].candidate);
+        ++taken[answer];
+      }
+    }
+    const double like_best = std::max((1 + known.chance.fall) * best, known.chance.distance);
+    for (const std::string& answer : order) {
+      const Instance& first = of_answer[answer].front();
+      if (result.size() < 2 * most && taken[answer] == 0 && first.distance <= like_best) {
+        result.push_back(first.candidate);
         ++taken[answer];
       }
     }

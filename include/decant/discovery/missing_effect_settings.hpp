@@ -16,7 +16,8 @@ struct MissingEffectSettings {
   DictionarySettings next_dictionary{4, 16, {0.5}, 0};  ///< after an effect was added, and something is still missing
   RecordedEvidenceSettings evidence{};
   JudgementSettings judgement{};
-  int refined = 3;                 ///< so many of the best are looked at more closely, >= 1
+  int refined = 3;                 ///< so many of the best are looked at more closely, >= 1; and up to as
+                                   ///< many more that chance does not tell from them
   int refinement_rounds = 3;       ///< steps for each, >= 1
   int last_refinement_rounds = 8;  ///< steps for the best of them in all, as long as each gains
   int repeats = 8;                 ///< of the best one, to see how far estimates scatter, >= 3
