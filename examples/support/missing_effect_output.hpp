@@ -200,12 +200,14 @@ inline std::string references_sentence(std::size_t references, const decant::Mis
            "taken to be little more than how far its own runs are from each other.";
   }
   const std::string count = std::to_string(references) + (references == 1 ? " reference" : " references");
-  return result.taught_by > 0
-             ? std::to_string(result.taught_by) + " of " + count +
-                   " look like the recordings: what they are off from the model by was taken off first."
-             : count +
-                   ": how far they are from the model is no gap. None looks enough like the recordings to take off "
-                   "what it is off by.";
+  if (result.taught_by > 0) {
+    return std::to_string(result.taught_by) + " of " + count +
+           " look like the recordings: what they are off from the model by was taken off first.";
+  }
+  return count +
+         ": how far they are from the model is no gap. None looks enough like the recordings to take off what "
+         "it is off by" +
+         (result.lessons > 0 ? "; what effects would have to be there for that was taken off first." : ".");
 }
 
 namespace detail {
@@ -306,6 +308,7 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                                                                          : nlohmann::json();
   json["told_apart_by_held_out"] = result.told_apart_by_others;
   json["taught_by"] = result.taught_by;
+  json["lessons"] = result.lessons;
   json["runs"] = result.runs;
   return json;
 }

@@ -145,6 +145,14 @@ TEST_CASE("nuisance space: what reality always does differently is learnt from r
   CHECK(with.center().isApprox(without.center()));
   // half of it may not carry over to another pour
   CHECK(with.distance(with.standardised(with.as_modelled(world.draws(1).col(0) + 0.5 * always))) < 2);
+  // unless less is known to: all of it is then 20 deviations in a single direction, of as many as there are features
+  const VectorXd none = world.draws(1).col(0);
+  sample.reference_error = 0.05;
+  const NuisanceSpace surer(sample);
+  CHECK(surer.as_modelled(none).isApprox(with.as_modelled(none)));
+  CHECK(surer.distance(surer.standardised(surer.as_modelled(none))) >
+        with.distance(with.standardised(with.as_modelled(none))) + 0.6 * 20 * 20 / 300);
+  sample.reference_error = 0.5;
   // without the first reference: as if there had been two
   NuisanceSample two = sample;
   two.references = sample.references.rightCols(2);
@@ -176,6 +184,7 @@ TEST_CASE("nuisance space: samples and settings are checked") {
   };
   refuses([](auto&, auto& settings) { settings.floor = 0; }, "floor must be > 0");
   refuses([](auto&, auto& settings) { settings.directions = -1; }, "directions must be >= 0");
+  refuses([](auto& sample, auto&) { sample.reference_error = 2; }, "reference_error must be 0 .. 1");
   refuses([](auto&, auto& settings) { settings.template_deviation = -1; }, "template_deviation must be >= 0");
   refuses([](auto& sample, auto&) { sample.draws.resize(10, 3); }, "draws must be at least 4");
   refuses([](auto& sample, auto&) { sample.baseline.resize(10, 0); }, "at least one simulation");

@@ -157,34 +157,24 @@ class RecordingComparison {
   void consult_references() {
     std::vector<EffectDictionary> dictionaries;  // references are judged without any
     for (const Interaction<Model>& each : references_) {
-      ComparedRecordings known = (*this)({each}, {}, settings_.dictionary);
+      ComparedRecordings known = runs_of({each}, {}, settings_.dictionary);
+      judge({each}, {{}}, known);
       unlike_.include(known.evidence.front(), known.chance);
       dictionaries.push_back(std::move(known.dictionary.front()));
     }
     reference_dictionaries_ = std::move(dictionaries);
   }
 
+  /// Whether something was learnt from references of other interactions: of recordings that are to be compared with
+  /// what they teach, there have to be runs with effects.
+  bool has_lessons() const noexcept { return unlike_by_effects_ && !unlike_by_effects_->lessons.of_reference.empty(); }
+
   /// Runs a dictionary of each interaction, and compares its recording with it.
   /// @param of have to outlive what is returned. @param effects of which there are runs; none where only the gap is
   /// asked about. @param added see plan_dictionary.
   ComparedRecordings operator()(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
                                 const DictionarySettings& settings, const std::vector<AppliedEffect>& added = {}) {
-    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings, added);
-    ComparedRecordings known;
-    known.effects = effects;
-    for (std::size_t k = 0; k < effects.size(); ++k) {
-      known.number.push_back(k);
-    }
-    known.dictionary.assign(of.size(), {effects, {}, {}});
-    // the model as it is before all else: where it does not work, nobody has to wait for the others
-    const auto others = plan.begin() + settings.baselines;
-    run({plan.begin(), others}, of, known);
-    for (std::size_t k = 0; k < of.size(); ++k) {
-      expects(!known.dictionary[k].of_role(RunRole::Baseline).empty(),
-              "MissingEffectSearch: runs of the model of '" + of[k].name + "' as it is that come to their end",
-              "at least one", "none");
-    }
-    run({others, plan.end()}, of, known);
+    ComparedRecordings known = runs_of(of, effects, settings, added);
     compare(of, known);
     const std::vector<PlannedRun> repeats = repeats_of_faint(known, settings);
     if (!repeats.empty()) {
@@ -234,6 +224,23 @@ class RecordingComparison {
  private:
   using Run = typename InteractionRuns<Model>::Run;
 
+  /// Dictionaries that recordings are not compared with yet.
+  ComparedRecordings runs_of(const std::vector<Interaction<Model>>& of, const std::vector<Effect>& effects,
+                             const DictionarySettings& settings, const std::vector<AppliedEffect>& added = {}) {
+    const std::vector<PlannedRun> plan = plan_dictionary(effects, settings, added);
+    ComparedRecordings known = without_runs(of.size(), effects);
+    // the model as it is before all else: where it does not work, nobody has to wait for the others
+    const auto others = plan.begin() + settings.baselines;
+    run({plan.begin(), others}, of, known);
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      expects(!known.dictionary[k].of_role(RunRole::Baseline).empty(),
+              "MissingEffectSearch: runs of the model of '" + of[k].name + "' as it is that come to their end",
+              "at least one", "none");
+    }
+    run({others, plan.end()}, of, known);
+    return known;
+  }
+
   /// Makes more runs of each interaction, and compares its recording with all that there are then.
   void extend(const std::vector<Interaction<Model>>& of, const std::vector<PlannedRun>& plan,
               ComparedRecordings& known) {
@@ -261,21 +268,22 @@ class RecordingComparison {
     }
   }
 
-  /// Recordings with dictionaries.
+  /// What references teach about a recording.
+  struct Teaching {
+    std::vector<ReferenceRecording> alike{};  ///< if there are any, there are no lessons
+    ReferenceLessons lessons{};
+  };
+
+  /// Recordings with dictionaries, and with what is known of references.
   void compare(const std::vector<Interaction<Model>>& of, ComparedRecordings& known) {
-    known.recorded.clear();
-    known.evidence.clear();
-    std::vector<std::vector<EffectEvidence>> draws;
-    for (std::size_t k = 0; k < of.size(); ++k) {  // dictionaries are not moved from here on
-      known.recorded.emplace_back(of[k].recording, known.dictionary[k], settings_.evidence,
-                                  teachers(of[k], known.dictionary[k]));
-      known.evidence.push_back(known.recorded[k].of_recording());
-      draws.emplace_back();
-      for (std::size_t draw = 0; draw < known.recorded[k].draws(); ++draw) {
-        draws.back().push_back(known.recorded[k].of_draw(draw));
+    std::vector<Teaching> taught;
+    for (std::size_t k = 0; k < of.size(); ++k) {
+      Teaching& by = taught.emplace_back(Teaching{teachers(of[k], known.dictionary[k]), {}});
+      if (by.alike.empty() && !references_.empty() && !known.effects.empty()) {
+        by.lessons = unlike_by_effects().lessons;
       }
     }
-    known.chance = chance_level(draws, settings_.judgement);
+    judge(of, taught, known);
     const Discrepancy most = discrepancy(known);
     const double factor = settings_.reference_factor;
     known.chance.largest_distance =
@@ -283,6 +291,24 @@ class RecordingComparison {
     known.chance.fall = std::max(known.chance.fall, factor * most.fall);
     known.chance.overlap = std::max(known.chance.overlap, factor * most.overlap);
     known.chance.blurred = std::max(known.chance.blurred, factor * most.blurred);
+  }
+
+  /// Recordings with dictionaries alone, but for what they are taught: one of that for each.
+  void judge(const std::vector<Interaction<Model>>& of, const std::vector<Teaching>& taught,
+             ComparedRecordings& known) const {
+    known.recorded.clear();
+    known.evidence.clear();
+    std::vector<std::vector<EffectEvidence>> draws;
+    for (std::size_t k = 0; k < of.size(); ++k) {  // dictionaries are not moved from here on
+      known.recorded.emplace_back(of[k].recording, known.dictionary[k], settings_.evidence, taught[k].alike,
+                                  taught[k].lessons);
+      known.evidence.push_back(known.recorded[k].of_recording());
+      draws.emplace_back();
+      for (std::size_t draw = 0; draw < known.recorded[k].draws(); ++draw) {
+        draws.back().push_back(known.recorded[k].of_draw(draw));
+      }
+    }
+    known.chance = chance_level(draws, settings_.judgement);
   }
 
   /// How far references are from the model, over how far its draws are, and how much of it effects seem to explain,
@@ -336,7 +362,7 @@ class RecordingComparison {
     const bool taught = std::all_of(known.recorded.begin(), known.recorded.end(),
                                     [](const RecordedEvidence& each) { return each.references() > 0; });
     if (!taught) {
-      return known.effects.empty() ? unlike_ : unlike_by_effects();
+      return known.effects.empty() ? unlike_ : unlike_by_effects().most;
     }
     for (const RecordedEvidence& each : known.recorded) {
       for (std::size_t k = 0; k < each.references(); ++k) {
@@ -346,18 +372,79 @@ class RecordingComparison {
     return most;
   }
 
-  /// With runs of all effects, which cost as much as those of a recording that is learnt from.
-  const Discrepancy& unlike_by_effects() {
+  /// What is known of references that do not look like what they are asked about.
+  struct UnlikeReferences {
+    Discrepancy most{};          ///< of each by what the others teach, if they do
+    ReferenceLessons lessons{};  ///< none where each is no nearer by what the others teach
+  };
+
+  /// With runs of all effects.
+  const UnlikeReferences& unlike_by_effects() {
     if (!unlike_by_effects_) {
-      unlike_by_effects_.emplace();  // references are judged without any, as in consult_references
-      Discrepancy most;
-      for (const Interaction<Model>& each : references_) {
-        const ComparedRecordings known = (*this)({each}, each.model->effects(), settings_.dictionary);
-        most.include(known.evidence.front(), known.chance);
+      UnlikeReferences& result = unlike_by_effects_.emplace();
+      std::vector<ComparedRecordings> known;
+      ReferenceLessons lessons;
+      known.reserve(references_.size());
+      double farther = 0;
+      for (std::size_t k = 0; k < references_.size(); ++k) {
+        ComparedRecordings& own = known.emplace_back(reference_with_effects(k));
+        judge({references_[k]}, {{}}, own);
+        lessons.of_reference.push_back(own.recorded.front().lesson());
+        result.most.include(own.evidence.front(), own.chance);
+        farther -= std::log(relative_distance(own));
       }
-      unlike_by_effects_ = most;
+      if (references_.size() < static_cast<std::size_t>(settings_.least_references)) {
+        return result;
+      }
+      std::vector<Teaching> others(references_.size(), {{}, lessons});
+      double error = lessons.error * lessons.error;  // as much as one reference's would be worth
+      for (std::size_t k = 0; k < references_.size(); ++k) {
+        std::vector<ReferenceLesson>& of = others[k].lessons.of_reference;
+        of.erase(of.begin() + static_cast<std::ptrdiff_t>(k));
+        judge({references_[k]}, {others[k]}, known[k]);
+        const double more = known[k].recorded.front().as_taught() - 1;
+        error += more * more;
+      }
+      lessons.error = std::min(0.5, std::sqrt(error / static_cast<double>(references_.size() + 1)));
+      Discrepancy taught;
+      for (std::size_t k = 0; k < references_.size(); ++k) {
+        others[k].lessons.error = lessons.error;
+        judge({references_[k]}, {others[k]}, known[k]);
+        taught.include(known[k].evidence.front(), known[k].chance);
+        farther += std::log(relative_distance(known[k]));
+      }
+      if (farther < 0) {
+        result = {taught, std::move(lessons)};
+      }
     }
     return *unlike_by_effects_;
+  }
+
+  static double relative_distance(const ComparedRecordings& of) {
+    return std::max(of.evidence.front().distance, 1e-12) / std::max(of.chance.distance, 1e-12);
+  }
+
+  /// Adds runs with effects to those that there are of a reference.
+  ComparedRecordings reference_with_effects(std::size_t reference) {
+    const Interaction<Model>& of = references_[reference];
+    ComparedRecordings known = without_runs(1, of.model->effects());
+    known.dictionary.front().runs = reference_dictionaries_[reference].runs;
+    known.dictionary.front().seen = reference_dictionaries_[reference].seen;
+    std::vector<PlannedRun> plan = plan_dictionary(known.effects, settings_.dictionary);
+    std::erase_if(plan,
+                  [](const PlannedRun& each) { return each.role == RunRole::Baseline || each.role == RunRole::Draw; });
+    run(plan, {of}, known);
+    return known;
+  }
+
+  static ComparedRecordings without_runs(std::size_t recordings, const std::vector<Effect>& effects) {
+    ComparedRecordings known;
+    known.effects = effects;
+    for (std::size_t k = 0; k < effects.size(); ++k) {
+      known.number.push_back(k);
+    }
+    known.dictionary.assign(recordings, {effects, {}, {}});
+    return known;
   }
 
   InteractionRuns<Model>* runs_;
@@ -366,7 +453,7 @@ class RecordingComparison {
   std::vector<EffectDictionary> reference_dictionaries_{};      ///< by reference: baselines and draws
   std::map<std::string, std::vector<std::size_t>> teachers_{};  ///< by recording: references that look like it
   Discrepancy unlike_{};                                        ///< of references without others' help, no effects
-  std::optional<Discrepancy> unlike_by_effects_{};              ///< with effects, once it was asked for
+  std::optional<UnlikeReferences> unlike_by_effects_{};         ///< with effects, once it was asked for
 };
 
 }  // namespace decant::inline DECANT_TARGET

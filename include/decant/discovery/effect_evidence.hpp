@@ -28,6 +28,7 @@
 #include <decant/discovery/observation.hpp>
 #include <decant/discovery/observation_features.hpp>
 #include <decant/discovery/reading_features.hpp>
+#include <decant/discovery/reference_lesson.hpp>
 #include <decant/discovery/silhouette_features.hpp>
 #include <decant/discovery/silhouette_gap.hpp>
 #include <decant/discovery/silhouette_series.hpp>
@@ -53,6 +54,8 @@ struct RecordedEvidenceSettings {
   SilhouetteFeatureSettings features{};
   ReadingFeatureSettings readings{};
   NuisanceSettings nuisance{};
+  double lesson_held_back = 3;  ///< > 0: of lesson_of. References of pours by another solver, left out one at a time,
+                                ///< are predicted as well with 1 to 10
 };
 
 /// A recording in which nothing is missing, and runs of a model of it: baselines and draws.
@@ -66,14 +69,17 @@ class RecordedEvidence {
  public:
   /// @param dictionary has to outlive it. @param references of interactions that the model
   /// predicts alike(): what they are off from their predictions is taken off what was recorded, see NuisanceSpace.
+  /// @param lessons of references of other interactions: so is what they make expected.
   /// Throws std::invalid_argument if fewer than five draws or no baseline worked, or if cameras, sensors or times are
   /// others.
   RecordedEvidence(Observation recording, const EffectDictionary& dictionary,
-                   const RecordedEvidenceSettings& settings = {}, std::vector<ReferenceRecording> references = {})
+                   const RecordedEvidenceSettings& settings = {}, std::vector<ReferenceRecording> references = {},
+                   const ReferenceLessons& lessons = {})
       : recording_(std::move(recording)),
         dictionary_(&dictionary),
         settings_(settings),
         references_(std::move(references)),
+        lessons_(lessons.of_reference.size()),
         features_(recording_, working(dictionary), settings.features, settings.readings),
         over_time_(features_) {
     const std::vector<std::size_t> baselines = dictionary.of_role(RunRole::Baseline);
@@ -99,9 +105,17 @@ class RecordedEvidence {
     if (baselines.front() == 0) {
       sample_.templates = columns(dictionary.of_role(RunRole::Template)).colwise() - of_run_.at(0);
     }
-    sample_.references.resize(sample_.draws.rows(), static_cast<Eigen::Index>(references_.size()));
+    sample_.references.resize(sample_.draws.rows(), static_cast<Eigen::Index>(references_.size() + lessons_));
     for (std::size_t k = 0; k < references_.size(); ++k) {
       sample_.references.col(static_cast<Eigen::Index>(k)) = residual(references_[k]);
+    }
+    if (lessons_ > 0) {
+      const std::vector<EffectChange> changes = changes_by_effects();
+      for (std::size_t k = 0; k < lessons_; ++k) {
+        sample_.references.col(static_cast<Eigen::Index>(references_.size() + k)) =
+            expected_residual(lessons.of_reference[k], changes, sample_.draws.rows());
+      }
+      sample_.reference_error = lessons.error;
     }
     sample_.floor = features_.floor(settings.nuisance.floor);
     space_ = std::make_unique<NuisanceSpace>(sample_, settings.nuisance);
@@ -114,6 +128,20 @@ class RecordedEvidence {
   std::size_t draws() const noexcept { return draws_.size(); }
 
   std::size_t references() const noexcept { return references_.size(); }
+  std::size_t lessons() const noexcept { return lessons_; }
+
+  /// If nothing is missing in it, how much there is of what references teach, 1 where it is just that.
+  double as_taught() const {
+    const Eigen::VectorXd expected_off = space_->standardised_difference(sample_.references.rowwise().mean());
+    const double size = space_->distance(expected_off);
+    const Eigen::VectorXd off = space_->standardised_difference(features_.of(recording_) - expected(*dictionary_));
+    return size > 0 ? space_->inner(expected_off, off) / size : 0;
+  }
+
+  /// What it teaches about recordings of other interactions, if nothing is missing in it.
+  ReferenceLesson lesson() const {
+    return lesson_of(own_ - expected(*dictionary_), changes_by_effects(), *space_, settings_.lesson_held_back);
+  }
 
   /// How far the recording is off what is expected, by feature, in standard deviations.
   Eigen::VectorXd standardised() const { return space_->standardised(own_); }
@@ -220,6 +248,12 @@ class RecordedEvidence {
       }
     }
     return sum;
+  }
+
+  std::vector<EffectChange> changes_by_effects() const {
+    return effect_changes(
+        *dictionary_, [this](std::size_t run) -> const Eigen::VectorXd& { return of_run_.at(run); },
+        expected(*dictionary_));
   }
 
   /// Nothing is known of what the reference's cameras did not see.
@@ -362,6 +396,7 @@ class RecordedEvidence {
   const EffectDictionary* dictionary_;
   RecordedEvidenceSettings settings_;
   std::vector<ReferenceRecording> references_{};
+  std::size_t lessons_;
   ObservationFeatures features_;
   std::vector<std::size_t> draws_{};
   Eigen::VectorXd own_{};  ///< features of the recording, see recorded_features

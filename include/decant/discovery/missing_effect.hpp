@@ -44,7 +44,8 @@ class MissingEffectSearch {
   /// Their models may know of fewer effects, or have them in another order; which one is which is told by its words.
   /// @param references recordings, of any poses, containers and amounts, in which nothing is missing: how far reality
   /// is from the model all the same. What those of nearly the same interaction are off by is taken off what was
-  /// recorded; of others it is known how much that is, and how much of it effects seem to explain. Without any, the
+  /// recorded; of others, what effects seem to be there for it (ReferenceLesson), and it is known how much is left
+  /// then, and how much of it effects seem to explain. Without any, the
   /// model's own scatter and JudgementSettings::distance_factor stand for it.
   /// Throws std::invalid_argument if there is nothing to learn from, models of what is learnt from have other effects
   /// than the first one's, or one of those held out none of them, names are not all different, or a setting is out of
@@ -136,7 +137,8 @@ class MissingEffectSearch {
     }
     std::optional<ComparedRecordings> others;
     if (!held_out_.empty() && !stages.empty()) {
-      others = compare(held_out_, {}, settings_.dictionary);
+      others = compare.has_lessons() ? compare(held_out_, effects(), settings_.held_out_dictionary)
+                                     : compare(held_out_, {}, settings_.dictionary);
       drop_idle(*others, make, result.learn.by_chance, stages);
       result.found = stages.back().found;
       result.learn.after = stages.back().after;
@@ -211,8 +213,10 @@ class MissingEffectSearch {
     result.judgement = judgement;
     result.judged = known.effects;
     result.taught_by = known.recorded.front().references();
+    result.lessons = known.recorded.front().lessons();
     for (const RecordedEvidence& each : known.recorded) {
       result.taught_by = std::min(result.taught_by, each.references());
+      result.lessons = std::min(result.lessons, each.lessons());
     }
     return judgement;
   }

@@ -106,6 +106,8 @@ struct MissingEffect {
   Confirmation confirmation = Confirmation::Untested;
   std::size_t taught_by = 0;  ///< references that look like each of the recordings: these are compared without what
                               ///< reality does differently all the same
+  std::size_t lessons = 0;    ///< references of other interactions whose ReferenceLesson was taken off, where none look
+                              ///< alike
   std::size_t runs = 0;       ///< of models
 };
 

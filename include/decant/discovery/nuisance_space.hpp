@@ -22,15 +22,16 @@ struct NuisanceSample {
   Eigen::MatrixXd templates{};   ///< p x m: how features answer an error of measurement of one tolerance
   Eigen::MatrixXd references{};  ///< p x r: of recordings that are known to have no hidden effect, less the baseline of
                                  ///< their own poses
+  double reference_error = 0.5;  ///< how much of their mean may not carry over, as a standard deviation, 0 .. 1
   Eigen::VectorXd floor{};       ///< by feature: its least standard deviation, > 0; the settings' where there is none
 
   /// The same as if one of the draws had not been made.
   NuisanceSample without_draw(Eigen::Index draw) const {
-    return {baseline, without_column(draws, draw), templates, references, floor};
+    return {baseline, without_column(draws, draw), templates, references, reference_error, floor};
   }
   /// Or one of the references.
   NuisanceSample without_reference(Eigen::Index reference) const {
-    return {baseline, draws, templates, without_column(references, reference), floor};
+    return {baseline, draws, templates, without_column(references, reference), reference_error, floor};
   }
 
  private:
@@ -57,8 +58,8 @@ struct NuisanceSettings {
 /// 1 for a draw that the space was not made of: one that is among its draws is far nearer, so calibrate on
 /// NuisanceSample::without_draw. Generalised least squares (Rao, Linear Statistical Inference, 1973, section 4a), with
 /// the covariance of factor analysis. The mean residual of references is what reality does differently whatever is
-/// missing: take it off what was recorded (as_modelled). That half of it may not carry over, and what they scatter, is
-/// added to what varies. A single direction that varies counts for next to nothing among p
+/// missing: take it off what was recorded (as_modelled). What of it may not carry over, and what they scatter, is added
+/// to what varies. A single direction that varies counts for next to nothing among p
 /// features, however large.
 class NuisanceSpace {
  public:
@@ -82,9 +83,10 @@ class NuisanceSpace {
     if (sample.references.cols() > 0) {
       always_ = sample.references.rowwise().mean();
       const Matrix scatter = sample.references.colwise() - always_;
-      variance.array() += scatter.array().square().rowwise().mean() + 0.25 * always_.array().square();
+      const Vector error = sample.reference_error * always_;
+      variance.array() += scatter.array().square().rowwise().mean() + error.array().square();
       append(off, scatter);
-      append(templates, 0.5 * always_ / std::max(settings.template_deviation, 1e-300));
+      append(templates, error / std::max(settings.template_deviation, 1e-300));
     }
     inverse_deviation_ = variance.array().rsqrt();
     off = inverse_deviation_.asDiagonal() * off;
@@ -143,6 +145,8 @@ class NuisanceSpace {
     expects(settings.directions >= 0, "NuisanceSpace: directions", ">= 0", settings.directions);
     expects(settings.template_deviation >= 0 && std::isfinite(settings.template_deviation),
             "NuisanceSpace: template_deviation", ">= 0", settings.template_deviation);
+    expects(sample.reference_error >= 0 && sample.reference_error <= 1, "NuisanceSpace: reference_error", "0 .. 1",
+            sample.reference_error);
     expects(sample.draws.cols() >= 4, "NuisanceSpace: draws", "at least 4", sample.draws.cols());
     expects(sample.baseline.cols() >= 1, "NuisanceSpace: baseline", "at least one simulation", sample.baseline.cols());
     expects(sample.draws.rows() >= 1, "NuisanceSpace: features", "at least one", sample.draws.rows());
