@@ -137,8 +137,9 @@ class MissingEffectSearch {
     }
     std::optional<ComparedRecordings> others;
     if (!held_out_.empty() && !stages.empty()) {
-      others = compare.has_lessons() ? compare(held_out_, effects(), settings_.held_out_dictionary)
-                                     : compare(held_out_, {}, settings_.dictionary);
+      DictionarySettings settings = settings_.dictionary;
+      settings.repeats = 0;
+      others = compare(held_out_, compare.has_lessons() ? effects() : std::vector<Effect>(), settings);
       drop_idle(*others, make, result.learn.by_chance, stages);
       result.found = stages.back().found;
       result.learn.after = stages.back().after;
@@ -227,10 +228,14 @@ class MissingEffectSearch {
                                                     RecordingComparison<Model>& compare, EffectRefiner<Model>& refine,
                                                     MissingEffect& result) const {
     std::vector<Answer> answers;
+    DictionarySettings next = settings_.next_dictionary;
+    if (compare.has_lessons()) {
+      next.shares = settings_.dictionary.shares;  // of which lessons are
+    }
     for (const std::vector<RefinedEffect>& found : beam) {
       const bool is_first_round = found.empty();
       ComparedRecordings known =
-          compare(learn_, effects(), is_first_round ? settings_.dictionary : settings_.next_dictionary, applied(found));
+          compare(learn_, effects(), is_first_round ? settings_.dictionary : next, applied(found));
       const Judgement judgement = is_first_round ? first_judgement(known, compare, result) : judged(known);
       if (judgement.verdict != Verdict::Nothing) {
         add(refine.best(judgement, known, found, result.learn.before, result.learn.after), known.chance, answers);

@@ -14,8 +14,6 @@ namespace decant::inline DECANT_TARGET {
 struct MissingEffectSettings {
   DictionarySettings dictionary{};
   DictionarySettings next_dictionary{4, 16, {0.5}, 0};  ///< after an effect was added, and something is still missing
-  /// Of what is held out, where references of other interactions teach by effects (ReferenceLesson).
-  DictionarySettings held_out_dictionary{4, 48, {0.35, 1.0}, 0};
   RecordedEvidenceSettings evidence{};
   JudgementSettings judgement{};
   int refined = 3;                 ///< so many of the best are looked at more closely, >= 1; and up to as
