@@ -275,7 +275,7 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
     effects.push_back(suction_effect<EffectModel>(*places.jet - aside * along, "beside the jet, in front"));
   }
   const double begin = recording.timestamps.front(), seconds = recording.timestamps.back() - begin;
-  std::vector<InteractionEffect<EffectModel>> of_bodies;
+  std::vector<InteractionEffect<EffectModel>> of_bodies, out_of_sight;
   for (std::size_t k = 0; k < recording.bodies.size(); ++k) {
     const recording::Body& body = recording.bodies[k];
     if (body.role == recording::Role::Junction) {
@@ -302,6 +302,9 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
                                                "floor of the " + names[k]));
     constexpr double half = 0.01;  // of an obstacle of middling size [m]
     if (source) {
+      // of a pan it would be a loss
+      out_of_sight.push_back(hidden_leak_effect<EffectModel>(id, inside->floor + 0.003 * inside->up,
+                                                             "floor of the " + names[k] + ", out of sight"));
       // on the wall below where liquid leaves
       const Vector3<double> in = (inside->mouth() - places.lip).normalized();
       of_bodies.push_back(
@@ -361,6 +364,9 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
                                                       "for a while, early", recording.gravity));
   effects.push_back(passing_force_effect<EffectModel>({begin + 0.5 * seconds, begin + 0.95 * seconds}, 0.25 * seconds,
                                                       "for a while, late", recording.gravity));
+  for (auto& effect : out_of_sight) {
+    effects.push_back(std::move(effect));
+  }
   return effects;
 }
 

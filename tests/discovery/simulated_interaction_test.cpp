@@ -613,6 +613,27 @@ TEST_CASE("simulated interaction: liquid that leaks goes on outside of the wall,
   }
 }
 
+TEST_CASE("simulated interaction: what leaks out of sight is gone") {
+  auto effects = pour_catalogue();
+  InteractionEffect<PourModel> hole = hidden_leak_effect<PourModel>(0, {0, 0, 0.004}, "cup, out of sight");
+  hole.name = "hidden";
+  CHECK(hole.seen_first == SeenFirst::Nothing);
+  effects.push_back(hole);
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  for (const char* name : {"leak", "hidden"}) {
+    PourModel model = pour.started(run_with(pour, name, {30}));
+    const auto before = model.fluid().size();
+    for (int frame = 0; frame < 4; ++frame) {
+      REQUIRE(model.step(0.025).advanced());
+    }
+    // 3 ml of 0.729 a particle
+    const auto gone = before - model.fluid().size();
+    CHECK(gone == (name == std::string("hidden") ? 4 : 0));
+  }
+}
+
 TEST_CASE("simulated interaction: a run with an effect that cannot be as it is asked for has failed, and no more") {
   auto effects = pour_catalogue();
   InteractionEffect<PourModel> hole = leak_effect<PourModel>(0, {0, 0, 0.004}, {0, 0, -0.0055}, "into the floor");

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <type_traits>
@@ -247,6 +248,36 @@ inline std::vector<std::pair<double, double>> steady(double millilitres_per_seco
   return {{std::max(window.from, -1e6), flow}, {std::min(window.until, 1e6), flow}};
 }
 
+/// @param below see leak_effect; nothing where liquid is not seen again.
+template <class Model>
+InteractionEffect<Model> hole_effect(BodyId body, const Vector3<double>& place,
+                                     const std::optional<Vector3<double>>& below, std::string where) {
+  Effect effect = plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
+                               "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
+  effect.place = place;
+  effect.place_tolerance = 0.02;
+  effect.seen_first = below ? SeenFirst::Liquid : SeenFirst::Nothing;
+  effect.where = std::move(where);
+  auto result = run_effect<Model>(std::move(effect), EffectKind::Physics,
+                                  [body, place, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                    OutletSettings outlet;
+                                    outlet.body = body;
+                                    outlet.position = *as.place;
+                                    if (below) {
+                                      const Vector3<double> moved = *as.place - place, out = below->normalized();
+                                      outlet.exit = place + *below + moved - out * out.dot(moved);
+                                    }
+                                    outlet.flow = steady(as.strength[0]);
+                                    changes.of_model.push_back([outlet](Model& model) {
+                                      OutletSettings own = outlet;
+                                      own.radius = 3 * model.spacing();
+                                      model.add_outlet(own);
+                                    });
+                                  });
+  result.of_body = body;
+  return result;
+}
+
 }  // namespace detail
 
 /// A hole. @param place where liquid goes out, and @param below how far from there it goes on outside of the wall, both
@@ -255,29 +286,13 @@ inline std::vector<std::pair<double, double>> steady(double millilitres_per_seco
 template <class Model>
 InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, const Vector3<double>& below,
                                      std::string where) {
-  Effect effect = plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
-                               "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
-  effect.place = place;
-  effect.place_tolerance = 0.02;
-  effect.seen_first = SeenFirst::Liquid;
-  effect.where = std::move(where);
-  auto result =
-      detail::run_effect<Model>(std::move(effect), EffectKind::Physics,
-                                [body, place, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-                                  OutletSettings outlet;
-                                  outlet.body = body;
-                                  outlet.position = *as.place;
-                                  const Vector3<double> moved = *as.place - place, out = below.normalized();
-                                  outlet.exit = place + below + moved - out * out.dot(moved);
-                                  outlet.flow = detail::steady(as.strength[0]);
-                                  changes.of_model.push_back([outlet](Model& model) {
-                                    OutletSettings own = outlet;
-                                    own.radius = 3 * model.spacing();
-                                    model.add_outlet(own);
-                                  });
-                                });
-  result.of_body = body;
-  return result;
+  return detail::hole_effect<Model>(body, place, below, std::move(where));
+}
+
+/// A hole of which what goes out is not seen again: it runs into a stand, or behind something.
+template <class Model>
+InteractionEffect<Model> hidden_leak_effect(BodyId body, const Vector3<double>& place, std::string where) {
+  return detail::hole_effect<Model>(body, place, std::nullopt, std::move(where));
 }
 
 /// Liquid that a container loses everywhere: it evaporates, or the container soaks it up. @param radius around the
