@@ -138,6 +138,9 @@ TEST_CASE("missing effect: what reality always does differently is learnt from r
   CHECK(model.effects()[late.found.front().effect].name == "late");
   CHECK(late.found.front().strength[0] == Approx(0.05).epsilon(0.2));
   CHECK(late.confirmation == Confirmation::Confirmed);
-  // one is not enough to know whether it carries over
+  // one interaction is not enough to know what carries over to others, however often it is recorded
+  std::vector<Interaction<JetModel>> same{references.front()};
+  same.push_back({"again", &others[0], film_of(foreign, 66, angles[0])});
   CHECK(found(0, {references.front()}).lessons == 0);
+  CHECK(found(0, same).lessons == 0);
 }

@@ -375,10 +375,11 @@ class RecordingComparison {
   /// What is known of references that do not look like what they are asked about.
   struct UnlikeReferences {
     Discrepancy most{};          ///< of each by what the others teach, if they do
-    ReferenceLessons lessons{};  ///< none where each is no nearer by what the others teach
+    ReferenceLessons lessons{};  ///< none where they are no nearer by what those of other interactions teach
   };
 
-  /// With runs of all effects.
+  /// With runs of all effects. What carries over is asked of each reference by leaving it out, with all that look like
+  /// it: a second recording of one interaction would teach more about the first than about others.
   const UnlikeReferences& unlike_by_effects() {
     if (!unlike_by_effects_) {
       UnlikeReferences& result = unlike_by_effects_.emplace();
@@ -393,31 +394,42 @@ class RecordingComparison {
         result.most.include(own.evidence.front(), own.chance);
         farther -= std::log(relative_distance(own));
       }
-      if (references_.size() < static_cast<std::size_t>(settings_.least_references)) {
-        return result;
+      std::vector<Teaching> others(references_.size(), {{}, {{}, lessons.error}});
+      for (std::size_t k = 0; k < references_.size(); ++k) {
+        for (std::size_t other = 0; other < references_.size(); ++other) {
+          if (!look_alike(known[k], known[other], references_[other])) {
+            others[k].lessons.of_reference.push_back(lessons.of_reference[other]);
+          }
+        }
+        if (others[k].lessons.of_reference.empty()) {
+          return result;  // of one interaction alone it is not known what carries over
+        }
       }
-      std::vector<Teaching> others(references_.size(), {{}, lessons});
       double error = lessons.error * lessons.error;  // as much as one reference's would be worth
       for (std::size_t k = 0; k < references_.size(); ++k) {
-        std::vector<ReferenceLesson>& of = others[k].lessons.of_reference;
-        of.erase(of.begin() + static_cast<std::ptrdiff_t>(k));
-        judge({references_[k]}, {others[k]}, known[k]);
-        const double more = known[k].recorded.front().as_taught() - 1;
-        error += more * more;
+        const RecordedEvidence taught(references_[k].recording, known[k].dictionary.front(), settings_.evidence, {},
+                                      others[k].lessons);
+        error += std::pow(taught.as_taught() - 1, 2);
       }
       lessons.error = std::min(0.5, std::sqrt(error / static_cast<double>(references_.size() + 1)));
-      Discrepancy taught;
+      Discrepancy most;
       for (std::size_t k = 0; k < references_.size(); ++k) {
         others[k].lessons.error = lessons.error;
         judge({references_[k]}, {others[k]}, known[k]);
-        taught.include(known[k].evidence.front(), known[k].chance);
+        most.include(known[k].evidence.front(), known[k].chance);
         farther += std::log(relative_distance(known[k]));
       }
       if (farther < 0) {
-        result = {taught, std::move(lessons)};
+        result = {most, std::move(lessons)};
       }
     }
     return *unlike_by_effects_;
+  }
+
+  /// Whether references are of nearly the same interaction, such as one and the same reference.
+  bool look_alike(const ComparedRecordings& one, const ComparedRecordings& other,
+                  const Interaction<Model>& of_other) const {
+    return one.recorded.front().unlikeness({of_other.recording, &other.dictionary.front()}) <= settings_.most_unlike;
   }
 
   static double relative_distance(const ComparedRecordings& of) {
