@@ -40,7 +40,7 @@ PlannedRun effect_run(std::size_t effect, double strength, std::uint32_t seed) {
   return {RunRole::Effect, effect, {{{effect, Eigen::VectorXd::Constant(1, strength), {}}}, seed, false}};
 }
 
-/// Of a run whose features are a number: it is told by how long its silhouettes are.
+/// Of a run that worked.
 Observation something() {
   SilhouetteSeries film(20, 20, 10);
   film.add(0, Mask::Zero(20, 20));

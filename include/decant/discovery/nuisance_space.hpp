@@ -59,8 +59,7 @@ struct NuisanceSettings {
 /// NuisanceSample::without_draw. Generalised least squares (Rao, Linear Statistical Inference, 1973, section 4a), with
 /// the covariance of factor analysis. The mean residual of references is what reality does differently whatever is
 /// missing: take it off what was recorded (as_modelled). What of it may not carry over, and what they scatter, is added
-/// to what varies. A single direction that varies counts for next to nothing among p
-/// features, however large.
+/// to what varies. A single direction that varies counts for next to nothing among p features, however large.
 class NuisanceSpace {
  public:
   using Vector = Eigen::VectorXd;
