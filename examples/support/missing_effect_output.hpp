@@ -84,6 +84,9 @@ inline nlohmann::json effect_json(const Effects& effects, const decant::RefinedE
   if (found.window) {
     json["window_s"] = {number_json(found.window->from), number_json(found.window->until)};
   }
+  if (found.speed) {
+    json["speed_m_s"] = number_json(*found.speed);
+  }
   if (effect.name == "lateral_force" && found.strength.norm() > 0) {
     const auto level = decant::level_directions(gravity);
     const decant::Vector3<double> way = (found.strength[0] * level[0] + found.strength[1] * level[1]).normalized();
@@ -114,10 +117,15 @@ inline std::string effect_words(const Effects& effects, const decant::RefinedEff
     text += decant::detail::fixed_text(found.window->until, 2);
     text += " s";
   }
+  if (found.speed) {
+    text += " at ";
+    text += decant::detail::fixed_text(*found.speed, 2);
+    text += " m/s";
+  }
   return text;
 }
 
-/// The effect's C++ with its strengths, place and times.
+/// The effect's C++ with its strengths, place, times and speed.
 inline std::string effect_code(const Effects& effects, const decant::RefinedEffect& found) {
   const decant::Effect& effect = effects.at(found.judged);
   std::string code;
@@ -135,6 +143,8 @@ inline std::string effect_code(const Effects& effects, const decant::RefinedEffe
       const double end = begun ? window.until : window.from;
       code += std::isfinite(end) ? three_digits(end) : end < 0 ? "-INFINITY" : "INFINITY";
       begun = true;
+    } else if (c == '^') {
+      code += three_digits(found.speed.value_or(effect.speed));
     } else {
       code += c;
     }

@@ -87,31 +87,6 @@ inline std::pair<decant::Vector3<double>, decant::Vector3<double>> lip_of(const 
   return {lip, tilted * lip};
 }
 
-/// A place of a wall.
-struct WallPlace {
-  decant::Vector3<double> point = decant::Vector3<double>::Zero();  ///< on its inside [m]
-  decant::Vector3<double> out = decant::Vector3<double>::UnitX();   ///< square to it, away from the liquid
-  double thickness = 0;                                             ///< [m]; 0 where it has none
-};
-
-/// Where a body's wall is that is seen from a point of the inside in the direction of another one; at that one if there
-/// is no wall.
-inline WallPlace wall_place(const decant::BoundingVolumeHierarchy& body, const decant::Vector3<double>& from,
-                            const decant::Vector3<double>& toward) {
-  using namespace decant;
-  const Vector3<double> direction = (toward - from).normalized();
-  WallPlace place{toward, direction};
-  if (const auto hit = body.first_hit_along(from, toward - from, 2)) {
-    place.point = hit->point;
-    place.out = hit->normal.dot(direction) > 0 ? hit->normal : Vector3<double>(-hit->normal);
-    constexpr double thickest = 0.03, beyond = 1e-5;  // [m]
-    if (const auto outside = body.first_hit_along(hit->point + beyond * place.out, place.out, thickest)) {
-      place.thickness = outside->fraction * thickest + beyond;
-    }
-  }
-  return place;
-}
-
 /// The containers of a pour, and about where it goes.
 struct PourPlaces {
   std::vector<std::optional<Inside>> inside{};                    ///< by body

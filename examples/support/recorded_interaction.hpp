@@ -120,7 +120,7 @@ inline std::string fingerprint(const std::vector<std::string>& sources, const Re
       hash = (hash ^ static_cast<unsigned char>(byte)) * 1099511628211U;
     }
   };
-  add("3");  // one more whenever the same words come to mean other predictions
+  add("4");  // one more whenever the same words come to mean other predictions
   for (const std::string& each : sources) {
     add(each);
   }
@@ -140,6 +140,7 @@ inline std::string fingerprint(const std::vector<std::string>& sources, const Re
     }
     rounded(effect.window.value_or(decant::TimeWindow{}).from);
     rounded(effect.window.value_or(decant::TimeWindow{}).until);
+    number(effect.speed);
   }
   number(model.settings().spacing);
   number(model.settings().jitter);
@@ -315,9 +316,9 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
       for (const auto& [where, share] : std::initializer_list<std::pair<const char*, double>>{
                {"foot of the wall of the ", 0.2}, {"wall of the ", 0.5}, {"wall below the rim of the ", 0.8}}) {
         const Vector3<double> lower = (1 - share) * wall * inside->up;
-        const WallPlace place = wall_place(surface, inside->mouth() - lower, places.lip - lower);
-        of_bodies.push_back(leak_effect<EffectModel>(id, place.point - 0.004 * place.out,
-                                                     (place.thickness + 0.013) * place.out, where + names[k]));
+        const Vector3<double> middle = inside->mouth() - lower;
+        const WallPlace place = wall_place(surface, middle, places.lip - lower);
+        of_bodies.push_back(wall_leak_effect<EffectModel>(id, middle, place.point, where + names[k]));
       }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(

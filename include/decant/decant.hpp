@@ -22,6 +22,7 @@
 #include <decant/boundary/swept_contact.hpp>
 #include <decant/boundary/triangle_mesh.hpp>
 #include <decant/boundary/wall_function.hpp>
+#include <decant/boundary/wall_place.hpp>
 #include <decant/boundary/wall_sample.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/camera/affine_map.hpp>

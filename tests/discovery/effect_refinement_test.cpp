@@ -124,10 +124,35 @@ TEST_CASE("effect point: strengths, places and times of several effects are one 
   CHECK(point.moving() == 10);
   CHECK(finer.moving() == 9);
   CHECK(finer.with(4, 0.31).is_held(4));
-  CHECK(finer.is_place_or_time(4));
-  CHECK(finer.is_place_or_time(8));
-  CHECK_FALSE(finer.is_place_or_time(1));
-  CHECK_FALSE(finer.is_place_or_time(7));
+  CHECK(finer.is_where_or_when(4));
+  CHECK(finer.is_where_or_when(8));
+  CHECK_FALSE(finer.is_where_or_when(1));
+  CHECK_FALSE(finer.is_where_or_when(7));
+}
+
+TEST_CASE("effect point: a jet's speed is looked for from rest on") {
+  Effect hole = named("hole", {{"", 0, 0, 40}});
+  hole.place = Vector3<double>(0, 0, 0.02);
+  hole.place_tolerance = 0.03;
+  hole.fastest = 1.2;
+  EffectPoint at_rest, jet;
+  at_rest.add(hole, 4, {4, numbers({20})});
+  CHECK(at_rest.value() == numbers({20, 0, 0, 0.02, 0}));
+  AppliedEffect guess{4, numbers({20})};
+  guess.speed = 0.6;
+  jet.add(hole, 4, guess);
+  CHECK(jet.applied(0).speed == 0.6);
+  CHECK(jet.with(4, 0.9).run(1).effects[0].speed == 0.9);
+  CHECK(jet.with(4, -1).value()[4] == 0);
+  CHECK(jet.with(4, 2).value()[4] == 1.2);
+  CHECK(jet.step(4) == Approx(0.24));
+  CHECK(jet.is_where_or_when(4));
+  jet.refine(4);
+  CHECK(jet.step(4) == Approx(0.12));
+  CHECK_FALSE(EffectPoint(at_rest).applied(0).window);
+
+  hole.speed = 2;
+  CHECK_THROWS_WITH(validate(hole), decant_test::contains("speed"));
 }
 
 TEST_CASE("effect point: a beat is looked for around the one to begin with, and what is steady has none") {

@@ -613,6 +613,86 @@ TEST_CASE("simulated interaction: liquid that leaks goes on outside of the wall,
   }
 }
 
+TEST_CASE("simulated interaction: a hole is in the wall that is there, and a jet leaves square to it") {
+  auto effects = pour_catalogue();
+  InteractionEffect<PourModel> hole = wall_leak_effect<PourModel>(0, {0, 0, 0.02}, {0.03, 0, 0.02}, "wall of the cup");
+  hole.name = "of_wall";
+  effects.push_back(hole);
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  ModelRun run = run_with(pour, "of_wall", {40});
+  const Cup cup{0.025, 0.03, 0.07, 0.003};
+  for (const double turn : {0.0, 2.0, 4.0}) {
+    for (const double radius : {0.02, 0.05}) {  // a place off the wall means that which is behind it, or before it
+      const Vector3<double> out(std::cos(turn), std::sin(turn), 0);
+      run.effects[0].place = radius * out + Vector3<double>(0, 0, 0.02);
+      run.effects[0].speed = 0.8;
+      PourModel model = pour.started(run);
+      int jets = 0;
+      for (int frame = 0; frame < 20 && jets == 0; ++frame) {
+        REQUIRE(model.step(0.004).advanced());
+        const Pose cup_from_world = model.bodies()[0].motion.at(model.time()).inverse();
+        for (Index i = 0; i < model.fluid().size(); ++i) {
+          const Vector3<double> x = cup_from_world * Vector3<double>(model.fluid().position.col(i).cast<double>());
+          const Vector3<double> v =
+              cup_from_world.rotation * Vector3<double>(model.fluid().velocity.col(i).cast<double>());
+          if (x.head<2>().norm() > 0.031) {  // outside
+            ++jets;
+            CHECK(x.head<2>().normalized().dot(out.head<2>()) > 0.98);
+            CHECK(v.dot(out) > 0.7);
+            CHECK(v.dot(out) < 0.9);
+          }
+        }
+      }
+      CHECK(jets == 1);
+    }
+  }
+  CHECK(pour.started(run_with(pour, "of_wall", {40})).fluid().size() > 0);
+  hole.of_body.reset();
+  CHECK_THROWS_WITH(Pour(pour_scene(), {hole}, settings), decant_test::contains("of_body"));
+}
+
+TEST_CASE("simulated interaction: a hole is looked for where a wall is nearest to what was seen, and highest") {
+  Pour::Scene scene = pour_scene();
+  auto effects = pour_catalogue();
+  effects.push_back(wall_leak_effect<PourModel>(0, {0, 0, 0.02}, {0.03, 0, 0.02}, "wall of the cup"));
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(scene, effects, settings);
+  const std::size_t leak = effects.size() - 1;
+  const auto& camera = scene.cameras[0];
+  const std::size_t frame = 3;
+  const Pose cup = scene.motion[0].at(scene.times[frame]);
+  const auto pixel = [&](const Vector3<double>& in_cup) {
+    return Eigen::Vector2d(camera.camera.project(camera.camera_from_world[frame] * (cup * in_cup)).pixel);
+  };
+  const auto seen = [&](const std::vector<Vector3<double>>& places) {
+    Sighting sighting{0, pixel(places.front()), scene.times[frame], {}};
+    for (const Vector3<double>& each : places) {
+      sighting.squares.push_back(pixel(each));
+    }
+    return sighting;
+  };
+  // on the side that faces the camera, which looks along +y
+  const Vector3<double> hole =
+      cup.inverse().rotation * Vector3<double>(0, -1, 0) * 0.0295 + Vector3<double>(0, 0, 0.02);
+  const auto nearest = pour.place_of(leak, seen({hole}));
+  REQUIRE(nearest);
+  CHECK((*nearest - hole).norm() < 0.003);
+  // a jet from there falls in front of the cup and on
+  const Vector3<double> down = cup.inverse().rotation * Vector3<double>(0, 0, -1);
+  const auto of_jet = pour.place_of(leak, seen({hole + 0.06 * down, hole + 0.02 * down, hole, hole + 0.01 * down}));
+  REQUIRE(of_jet);
+  CHECK((*of_jet - *nearest).norm() < 1e-9);
+  // beside the cup it is the wall's nearest place
+  const Vector3<double> aside = cup.inverse().rotation * Vector3<double>(1, 0, 0);
+  const auto beside = pour.place_of(leak, seen({Vector3<double>(0, 0, 0.035) + 0.1 * aside}));
+  REQUIRE(beside);
+  CHECK(beside->normalized().dot(aside) > 0.5);
+  CHECK(!pour.place_of(leak, Sighting{0, {std::nan(""), 0}, 0, {}}));
+}
+
 TEST_CASE("simulated interaction: what leaks out of sight is gone") {
   auto effects = pour_catalogue();
   InteractionEffect<PourModel> hole = hidden_leak_effect<PourModel>(0, {0, 0, 0.004}, "cup, out of sight");

@@ -207,6 +207,7 @@ class RecordingComparison {
           effect.window = at.window;
           effect.window_tolerance = std::min(effect.window_tolerance, detail::latest_sight);
         }
+        effect.speed = at.speed.value_or(effect.speed);
         for (const double share : settings_.dictionary.shares) {
           PlannedRun planned{RunRole::Effect, known.effects.size() - 1, {{at}, seed++, false}};
           planned.run.effects.back().strength = effect.base();

@@ -41,6 +41,11 @@ struct DisagreeingSquare {
   PixelBox box{};             ///< which may reach beyond the image's border [px]
   double begin = 0, end = 0;  ///< of the window's frames [s]
   double off = 0;             ///< from what is expected, > 0, counted in what differs anyway
+
+  /// (u, v) [px]. Pixel coordinates are of pixels' middles.
+  Eigen::Vector2d middle() const noexcept {
+    return {0.5 * (box.u_begin + box.u_end) - 0.5, 0.5 * (box.v_begin + box.v_end) - 0.5};
+  }
 };
 
 namespace detail {
@@ -51,9 +56,8 @@ class MiddleOfSquares {
   void add(const DisagreeingSquare& square) noexcept {
     total_ += square.off;
     const double share = square.off / total_;
-    // pixel coordinates are of pixels' middles
-    u_ += share * (0.5 * (square.box.u_begin + square.box.u_end) - 0.5 - u_);
-    v_ += share * (0.5 * (square.box.v_begin + square.box.v_end) - 0.5 - v_);
+    u_ += share * (square.middle().x() - u_);
+    v_ += share * (square.middle().y() - v_);
   }
   double u() const noexcept { return u_; }
   double v() const noexcept { return v_; }

@@ -3,6 +3,7 @@
 
 /// What a model may lack, or what may be wrong with a measurement, told to people and to programs.
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -85,9 +86,11 @@ struct Effect {
   /// Of what comes again and again: beats that are tried when it is looked at closely, the best one further, since no
   /// step leads there from another one. Its window is one beat then, and without ends the mean over many.
   std::vector<TimeWindow> beats{};
+  double speed = 0;    ///< with which its liquid comes out of a wall [m/s], 0 .. fastest
+  double fastest = 0;  ///< up to which speeds are tried as well [m/s]; 0: no other is
   std::string code{};  ///< C++ that adds it to a simulator: @ stands for the strength, one after another of its
-                       ///< components, # for the place, and ~ for the window's ends, one after another; empty where
-                       ///< there is none
+                       ///< components, # for the place, ~ for the window's ends, one after another, and ^ for the
+                       ///< speed; empty where there is none
 
   /// The family, or the name where there is none.
   const std::string& answer() const noexcept { return family.empty() ? name : family; }
@@ -128,6 +131,8 @@ inline void validate(const Effect& effect) {
           effect.window_tolerance);
   expects(!effect.window || effect.window->from < effect.window->until, of + "window", "its beginning before its end",
           effect.window ? effect.window->from : 0);
+  expects(effect.speed >= 0 && effect.speed <= std::max(0.0, effect.fastest) && std::isfinite(effect.fastest),
+          of + "speed [m/s]", "0 .. the fastest, which is finite", effect.speed);
   for (const TimeWindow& beat : effect.beats) {
     expects(effect.window && beat.from < beat.until, of + "beats",
             "a window to stand for, their beginning before their end", beat.from);

@@ -144,6 +144,9 @@ inline std::string run_key(const std::vector<Effect>& effects, const ModelRun& r
       key += " from " + text(applied.window->from);
       key += " until " + text(applied.window->until);
     }
+    if (applied.speed) {
+      key += " with " + text(*applied.speed);
+    }
   }
   return key;
 }

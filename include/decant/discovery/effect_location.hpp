@@ -29,7 +29,8 @@ inline constexpr double latest_sight = 0.3;
 }  // namespace detail
 
 /// Effects at the places, and from the times on, where recordings say that they are, without strengths. Of each name
-/// the one whose usual place is nearest to that; none that would be far from all that are usual.
+/// the one whose usual place is nearest to that; none that would be far from all that are usual. What may come with a
+/// speed is tried with several: jets that fall apart do not overlap, and say nothing of each other.
 /// @param models by recording, all with the same effects; at least one. @param where by recording; the first one that
 /// disagrees is asked. Throws std::invalid_argument if there are not as many.
 template <LocatingModel Model>
@@ -57,14 +58,19 @@ std::vector<AppliedEffect> located_effects(const std::vector<const Model*>& mode
     if (onset == nullptr) {
       continue;
     }
-    const Sighting sighting{onset->camera, {onset->onset_u, onset->onset_v}, onset->begin};
+    Sighting sighting{onset->camera, {onset->onset_u, onset->onset_v}, onset->begin, {}};
+    for (const DisagreeingSquare& square : onset->squares) {
+      if (square.begin <= onset->begin) {
+        sighting.squares.push_back(square.middle());
+      }
+    }
     const std::optional<Vector3<double>> place = models[recording]->place_of(k, sighting);
     const double off = place ? (*place - *effect.place).norm() / effect.place_tolerance : farthest;
     const auto other = nearest.find(effect.name);
     if (!(off < farthest) || (other != nearest.end() && other->second.first <= off)) {
       continue;
     }
-    AppliedEffect located{k, {}, place, {}};
+    AppliedEffect located{k, {}, place, {}, {}};
     if (effect.window && std::isfinite(effect.window->from)) {  // it takes a moment to be seen
       located.window = effect.window;
       located.window->from = std::min(onset->begin - 0.3 * detail::latest_sight, effect.window->until);
@@ -73,7 +79,14 @@ std::vector<AppliedEffect> located_effects(const std::vector<const Model*>& mode
   }
   std::vector<AppliedEffect> located;
   for (const auto& [name, found] : nearest) {
-    located.push_back(found.second);
+    const double fastest = effects[found.second.effect].fastest;
+    constexpr int quarters = 4;
+    for (int k = 0; k <= (fastest > 0 ? quarters : 0); ++k) {
+      located.push_back(found.second);
+      if (fastest > 0) {
+        located.back().speed = fastest * k / quarters;
+      }
+    }
   }
   return located;
 }

@@ -24,9 +24,10 @@
 
 namespace decant::inline DECANT_TARGET {
 
-/// A guess of strengths, places and times of one or more effects as one vector: of each effect its components, then its
-/// place's three coordinates [m] and its window's finite ends [s], if it has any that are looked for. Places and times
-/// are looked for around the effect's own ones; around the guess's where the effect has no time, but beats.
+/// A guess of strengths, places, times and speeds of one or more effects as one vector: of each effect its components,
+/// then its place's three coordinates [m], its window's finite ends [s] and its speed [m/s], if it has any that are
+/// looked for. Places and times are looked for around the effect's own ones; around the guess's where the effect has no
+/// time, but beats.
 class EffectPoint {
  public:
   /// Takes one more effect. @param effect has to outlive the point. @param number of it among the model's effects.
@@ -49,6 +50,7 @@ class EffectPoint {
     const bool timed = effect.window && effect.window_tolerance > 0;
     part.begins = timed && std::isfinite(window.from) ? 1 : 0;
     part.ends = timed && std::isfinite(window.until) ? 1 : 0;
+    part.speeds = effect.fastest > 0 ? 1 : 0;
     value_.conservativeResize(value_.size() + part.size());
     fineness_.resize(static_cast<std::size_t>(value_.size()), 1);
     value_.segment(part.begin, components) = guess.strength;
@@ -60,6 +62,9 @@ class EffectPoint {
     }
     if (part.ends > 0) {
       value_[part.time() + part.begins] = window.until;
+    }
+    if (part.speeds > 0) {
+      value_[part.speed()] = guess.speed.value_or(effect.speed);
     }
     parts_.push_back(part);
   }
@@ -82,15 +87,21 @@ class EffectPoint {
       result.window->from = of.begins > 0 ? value_[of.time()] : result.window->from;
       result.window->until = of.ends > 0 ? value_[of.time() + of.begins] : result.window->until;
     }
+    if (of.speeds > 0) {
+      result.speed = value_[of.speed()];
+    }
     return result;
   }
 
-  /// Whether a number is part of a place or a time, rather than of a strength.
-  bool is_place_or_time(Eigen::Index k) const { return k >= part_of(k).place(); }
+  /// Whether a number is part of a place, a time or a speed, rather than of a strength.
+  bool is_where_or_when(Eigen::Index k) const { return k >= part_of(k).place(); }
 
   /// How far off a number is tried to see what it changes.
   double step(Eigen::Index k) const {
     const Part& of = part_of(k);
+    if (k >= of.speed()) {
+      return 0.2 * of.effect->fastest * fineness_[static_cast<std::size_t>(k)];
+    }
     if (k >= of.place()) {
       const double tolerance = k >= of.time() ? of.effect->window_tolerance : of.effect->place_tolerance;
       return 0.4 * tolerance * fineness_[static_cast<std::size_t>(k)];
@@ -102,6 +113,9 @@ class EffectPoint {
   /// The range of a number: of a strength see EffectComponent::limits.
   std::pair<double, double> range(Eigen::Index k) const {
     const Part& of = part_of(k);
+    if (k >= of.speed()) {
+      return {0, of.effect->fastest};
+    }
     if (k >= of.time()) {
       const bool end = of.begins == 0 || k > of.time();
       const double middle = end ? of.window.until : of.window.from;
@@ -121,9 +135,9 @@ class EffectPoint {
     return other;
   }
 
-  /// Tries a number of a place or a time half as far off from now on.
+  /// Tries a number of a place, a time or a speed half as far off from now on.
   void refine(Eigen::Index k) { fineness_.at(static_cast<std::size_t>(k)) *= 0.5; }
-  /// A number of a place or a time stays where it is from now on: its step is none.
+  /// Such a number stays where it is from now on: its step is none.
   void hold(Eigen::Index k) { fineness_.at(static_cast<std::size_t>(k)) = 0; }
   bool is_held(Eigen::Index k) const { return fineness_.at(static_cast<std::size_t>(k)) == 0; }
   /// How many numbers are not held.
@@ -155,13 +169,14 @@ class EffectPoint {
   struct Part {
     const Effect* effect;
     std::size_t number;
-    Eigen::Index begin, components, coordinates = 0, begins = 0, ends = 0;  ///< how many numbers it has of each
+    Eigen::Index begin, components, coordinates = 0, begins = 0, ends = 0, speeds = 0;  ///< how many of each it has
     Eigen::VectorXd least_step{};
     TimeWindow window{};  ///< about when
 
-    Eigen::Index size() const noexcept { return components + coordinates + begins + ends; }
+    Eigen::Index size() const noexcept { return components + coordinates + begins + ends + speeds; }
     Eigen::Index place() const noexcept { return begin + components; }
     Eigen::Index time() const noexcept { return place() + coordinates; }
+    Eigen::Index speed() const noexcept { return time() + begins + ends; }
   };
 
   const Part& part_of(Eigen::Index k) const {
@@ -174,7 +189,7 @@ class EffectPoint {
 
   std::vector<Part> parts_{};
   Eigen::VectorXd value_{};
-  std::vector<double> fineness_{};  ///< by number: of a place's or a time's the step, over the one to begin with
+  std::vector<double> fineness_{};  ///< by number: the step, over the one to begin with; that of strengths is 1
 };
 
 /// What a recording's simulations say around a point. Features are as they are, not standardised.
@@ -199,8 +214,8 @@ inline bool tells(const std::vector<RefinementView>& views, Eigen::Index number,
 
 /// By how much a point has to move so that a model that is linear around it comes nearest to features of all recordings
 /// together: a step of Gauss and Newton. @param features of each of the views' recordings, or of what stands for it.
-/// No place or time moves more than two of its steps, no strength more than four, which effects are closer to linear
-/// in; nor does any leave its range.
+/// No place, time or speed moves more than two of its steps, no strength more than four, which effects are closer to
+/// linear in; nor does any leave its range.
 /// @param without_chaos takes what is chaos in slopes off their squares, up to two thirds in each direction. Chaos
 /// makes steps shorter. That holds back what slopes hardly tell, as ridge regression does; but how far estimates
 /// scatter would seem to be less than it is (Fuller, Measurement Error Models, 1987, section 1.2).
@@ -229,9 +244,9 @@ inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<Refin
       chaos[i] += view.chaos.size() > 0 ? unit[i] * unit[i] * view.chaos[i] : 0;
     }
   }
-  // what changes nothing stays where it is, and so does a place or a time that changes no more than chaos does
+  // what changes nothing stays where it is, and so does a place, a time or a speed that changes no more than chaos does
   for (Eigen::Index k = 0; k < size; ++k) {
-    if (at.is_place_or_time(k) && !tells(views, k)) {
+    if (at.is_where_or_when(k) && !tells(views, k)) {
       curvature.row(k).setZero();
       curvature.col(k).setZero();
       answer[k] = 0;
@@ -249,7 +264,7 @@ inline Eigen::VectorXd refinement(const EffectPoint& at, const std::vector<Refin
   }
   for (Eigen::Index k = 0; k < size; ++k) {
     const auto [low, high] = at.range(k);
-    const double most = at.is_place_or_time(k) ? 2 : 4;
+    const double most = at.is_where_or_when(k) ? 2 : 4;
     move[k] = std::clamp(at.value()[k] + unit[k] * std::clamp(move[k], -most, most), low, high) - at.value()[k];
   }
   return move;

@@ -478,7 +478,7 @@ class EffectRefiner {
       const auto [begin, count] = point.strength_of(part);
       const std::size_t judged = part < found.size() ? found[part].judged : reached.candidate->judged;
       one.effects.push_back({applied.effect, judged, applied.strength, deviation.segment(begin, count), applied.place,
-                             applied.window, one.distance, one.share, one.grown});
+                             applied.window, applied.speed, one.distance, one.share, one.grown});
     }
     return one;
   }

@@ -30,6 +30,7 @@ struct AppliedEffect {
   Eigen::VectorXd strength{};              ///< by component
   std::optional<Vector3<double>> place{};  ///< [m], where it is not the effect's own
   std::optional<TimeWindow> window{};      ///< likewise
+  std::optional<double> speed{};           ///< [m/s], likewise
 };
 
 /// One run of a model.
@@ -54,7 +55,7 @@ inline std::vector<AppliedEffect> effects_of_run(const std::vector<Effect>& effe
                                                  std::mt19937& random) {
   std::vector<AppliedEffect> as;
   for (const Effect& effect : effects) {
-    as.push_back({as.size(), effect.base(), effect.place, effect.window});
+    as.push_back({as.size(), effect.base(), effect.place, effect.window, effect.speed});
     for (std::size_t component = 0; component < effect.components.size(); ++component) {
       const EffectComponent& of = effect.components[component];
       if (run.tolerated && of.tolerance > 0 && effect.kind != EffectKind::Nuisance) {
@@ -73,6 +74,7 @@ inline std::vector<AppliedEffect> effects_of_run(const std::vector<Effect>& effe
     own.strength = applied.strength;
     own.place = applied.place ? applied.place : own.place;
     own.window = applied.window ? applied.window : own.window;
+    own.speed = applied.speed ? applied.speed : own.speed;
   }
   return as;
 }
@@ -120,6 +122,8 @@ struct Sighting {
   std::size_t camera = 0;
   Eigen::Vector2d pixel{0, 0};  ///< (u, v) [px]
   double time = 0;              ///< on the recording's clock [s]
+  /// Middles of all squares of the picture that it was seen in [px]; none where that is not known.
+  std::vector<Eigen::Vector2d> squares{};
 };
 
 /// Predicts one interaction, with the bodies moving as they were recorded to.

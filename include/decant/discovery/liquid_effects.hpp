@@ -19,6 +19,7 @@
 #include <decant/boundary/pipe_blockage.hpp>
 #include <decant/boundary/pipe_section.hpp>
 #include <decant/boundary/shapes.hpp>
+#include <decant/boundary/wall_place.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
@@ -248,30 +249,34 @@ inline std::vector<std::pair<double, double>> steady(double millilitres_per_seco
   return {{std::max(window.from, -1e6), flow}, {std::min(window.until, 1e6), flow}};
 }
 
-/// @param below see leak_effect; nothing where liquid is not seen again.
-template <class Model>
-InteractionEffect<Model> hole_effect(BodyId body, const Vector3<double>& place,
-                                     const std::optional<Vector3<double>>& below, std::string where) {
+/// A hole in a body, in its frame.
+struct Hole {
+  Vector3<double> position = Vector3<double>::Zero();  ///< where liquid goes out [m]
+  std::optional<Vector3<double>> exit{};               ///< where it goes on [m]; nothing: it is not seen again
+  Vector3<double> out = Vector3<double>::Zero();       ///< in which direction, if it comes with a speed
+};
+
+/// @param hole_at(model, place) the Hole that is looked for there.
+template <class Model, class HoleAt>
+InteractionEffect<Model> hole_effect(BodyId body, const Vector3<double>& place, std::string where, HoleAt hole_at) {
   Effect effect = plain_effect("leak", "", "ml/s", "a container leaks", {"", 0, 0, 40},
                                "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}});");
   effect.place = place;
   effect.place_tolerance = 0.02;
-  effect.seen_first = below ? SeenFirst::Liquid : SeenFirst::Nothing;
+  effect.seen_first = SeenFirst::Liquid;
   effect.where = std::move(where);
   auto result = run_effect<Model>(std::move(effect), EffectKind::Physics,
-                                  [body, place, below](const AppliedEffect& as, InteractionChanges<Model>& changes) {
-                                    OutletSettings outlet;
-                                    outlet.body = body;
-                                    outlet.position = *as.place;
-                                    if (below) {
-                                      const Vector3<double> moved = *as.place - place, out = below->normalized();
-                                      outlet.exit = place + *below + moved - out * out.dot(moved);
-                                    }
-                                    outlet.flow = steady(as.strength[0]);
-                                    changes.of_model.push_back([outlet](Model& model) {
-                                      OutletSettings own = outlet;
-                                      own.radius = 3 * model.spacing();
-                                      model.add_outlet(own);
+                                  [body, hole_at](const AppliedEffect& as, InteractionChanges<Model>& changes) {
+                                    changes.of_model.push_back([body, hole_at, as](Model& model) {
+                                      const Hole hole = hole_at(model, *as.place);
+                                      OutletSettings outlet;
+                                      outlet.body = body;
+                                      outlet.position = hole.position;
+                                      outlet.radius = 3 * model.spacing();
+                                      outlet.exit = hole.exit;
+                                      outlet.exit_velocity = as.speed.value_or(0) * hole.out;
+                                      outlet.flow = steady(as.strength[0]);
+                                      model.add_outlet(outlet);
                                     });
                                   });
   result.of_body = body;
@@ -280,19 +285,47 @@ InteractionEffect<Model> hole_effect(BodyId body, const Vector3<double>& place,
 
 }  // namespace detail
 
-/// A hole. @param place where liquid goes out, and @param below how far from there it goes on outside of the wall, both
-/// in the body's frame [m]: at other places along the wall beside them, at such nearer to it or farther off it as far
-/// outside as here. @param where in words.
+/// A hole of which it is known where liquid goes on. @param place where it goes out, and @param below how far from
+/// there it goes on outside of the wall, both in the body's frame [m]: at other places along the wall beside them, at
+/// such nearer to it or farther off it as far outside as here. @param where in words.
 template <class Model>
 InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, const Vector3<double>& below,
                                      std::string where) {
-  return detail::hole_effect<Model>(body, place, below, std::move(where));
+  return detail::hole_effect<Model>(body, place, std::move(where),
+                                    [place, below](const Model&, const Vector3<double>& at) {
+                                      const Vector3<double> moved = at - place, out = below.normalized();
+                                      return detail::Hole{at, place + below + moved - out * out.dot(moved)};
+                                    });
+}
+
+/// A hole anywhere in a wall, through which liquid leaves square to it, at rest or as a jet.
+/// @param inside a point from which the wall is looked at, and @param place about where the hole is: it is where the
+/// wall is seen from the one in the direction of the other; both in the body's frame [m]. @param where in words.
+template <class Model>
+InteractionEffect<Model> wall_leak_effect(BodyId body, const Vector3<double>& inside, const Vector3<double>& place,
+                                          std::string where) {
+  auto effect = detail::hole_effect<
+      Model>(body, place, std::move(where), [body, inside](const Model& model, const Vector3<double>& at) {
+    const WallPlace wall = wall_place(*model.bodies()[body].surface, inside, at);
+    constexpr double before = 0.004, beyond = 0.009;  // [m], clear of the wall by particles of usual spacings
+    return detail::Hole{wall.point - before * wall.out, wall.point + (wall.thickness + beyond) * wall.out, wall.out};
+  });
+  effect.code =
+      "simulator.add_outlet({container, {#}, radius, {{0, 1e-6 * @}, {60, 1e-6 * @}}, OutletOrder::Nearest, "
+      "beyond_the_wall, ^ * out_of_it});";
+  effect.place_tolerance = 0.03;
+  effect.fastest = 1.2;  // of water that stands 7 cm above the hole (Torricelli)
+  effect.on_wall = true;
+  return effect;
 }
 
 /// A hole of which what goes out is not seen again: it runs into a stand, or behind something.
 template <class Model>
 InteractionEffect<Model> hidden_leak_effect(BodyId body, const Vector3<double>& place, std::string where) {
-  return detail::hole_effect<Model>(body, place, std::nullopt, std::move(where));
+  auto effect = detail::hole_effect<Model>(body, place, std::move(where),
+                                           [](const Model&, const Vector3<double>& at) { return detail::Hole{at}; });
+  effect.seen_first = SeenFirst::Nothing;
+  return effect;
 }
 
 /// Liquid that a container loses everywhere: it evaporates, or the container soaks it up. @param radius around the

@@ -29,13 +29,14 @@ struct RefinedEffect {
   Eigen::VectorXd deviation{};             ///< standard deviation, by component
   std::optional<Vector3<double>> place{};  ///< [m], where it was looked for
   std::optional<TimeWindow> window{};      ///< likewise
+  std::optional<double> speed{};           ///< [m/s], likewise
   double distance = 0;                     ///< that is left of the recordings it was found in
   double share = 0;                        ///< of what is reducible, at most 1
   double grown = 0;                        ///< by how much the gap grows at some moments, see grown_gap
   /// That it is what is missing, alone, if one of those that were refined first is; by all recordings.
   double probability = std::numeric_limits<double>::quiet_NaN();
 
-  AppliedEffect applied() const { return {effect, strength, place, window}; }
+  AppliedEffect applied() const { return {effect, strength, place, window, speed}; }
   /// Strengths that hold the truth with 90 %, by component.
   std::pair<double, double> interval_90(std::size_t component) const {
     const auto k = static_cast<Eigen::Index>(component);

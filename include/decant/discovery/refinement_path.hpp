@@ -136,10 +136,10 @@ class RefinementPath {
     settled_ = is_near;
   }
 
-  /// Of places and times. What changes no more than chaos does is held, unless strengths are still on their way, since
-  /// a weak effect's time does not tell: one camera may not tell how far off something is. A step of what hardly moves
-  /// any more is halved, as long as half of it tells four times as much as chaos does: a jet that is moved by more than
-  /// its width says nothing of which way to go.
+  /// Of places, times and speeds. What changes no more than chaos does is held, unless strengths are still on their
+  /// way, since a weak effect's time does not tell: one camera may not tell how far off something is. A step of what
+  /// hardly moves any more is halved, as long as half of it tells four times as much as chaos does: a jet that is moved
+  /// by more than its width says nothing of which way to go.
   /// @return whether any was halved.
   bool set_steps(EffectPoint& next) const {
     constexpr double halvable = 4 * 4 + 1;  // of a whole step, which chaos is part of
@@ -148,10 +148,10 @@ class RefinementPath {
     };
     bool strength_moves = false, is_finer = false;
     for (Eigen::Index k = 0; k < next.size(); ++k) {
-      strength_moves = strength_moves || (!next.is_place_or_time(k) && moves(k));
+      strength_moves = strength_moves || (!next.is_where_or_when(k) && moves(k));
     }
     for (Eigen::Index k = 0; k < next.size(); ++k) {
-      if (!next.is_place_or_time(k) || next.is_held(k)) {
+      if (!next.is_where_or_when(k) || next.is_held(k)) {
         continue;
       }
       if (!tells(views_, k)) {

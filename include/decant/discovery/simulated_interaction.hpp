@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -24,6 +25,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <decant/boundary/wall_place.hpp>
 #include <decant/core/expects.hpp>
 #include <decant/core/image.hpp>
 #include <decant/core/pose.hpp>
@@ -95,6 +97,7 @@ struct InteractionChanges {
 template <class Model>
 struct InteractionEffect : Effect {
   std::optional<std::size_t> of_body{};  ///< in whose frame its place is; the world's otherwise
+  bool on_wall = false;                  ///< it acts at that body's wall, wherever that may be
   std::function<void(const AppliedEffect& as, InteractionChanges<Model>& changes)> apply{};
 };
 
@@ -178,7 +181,10 @@ class SimulatedInteraction {
       expects(static_cast<bool>(effect.apply), "Effect '" + effect.name + "': apply", "a function", "none");
       expects(!effect.of_body || *effect.of_body < scene_.motion.size(), "Effect '" + effect.name + "': of_body",
               "one of those that there are motions of", effect.of_body.value_or(0));
+      expects(!effect.on_wall || effect.of_body, "Effect '" + effect.name + "': of_body", "one where it is on a wall",
+              "none");
       of_body_.push_back(effect.of_body);
+      on_wall_.push_back(effect.on_wall);
       apply_.push_back(std::move(effect.apply));
       effects_.push_back(std::move(effect));
     }
@@ -212,7 +218,7 @@ class SimulatedInteraction {
 
   /// Where an effect acts if that is what was seen: on the pixel's ray, in the upright plane through the effect's usual
   /// place that faces the camera, and no lower than that if it is liquid that falls. One camera does not say how far
-  /// off it is.
+  /// off it is. What acts at a wall is where that is nearest to what was seen.
   std::optional<Vector3<double>> place_of(std::size_t effect, const Sighting& seen) const {
     const Effect& of = effects_.at(effect);
     if (!of.place || seen.camera >= scene_.cameras.size() || !seen.pixel.allFinite() || !std::isfinite(seen.time)) {
@@ -224,9 +230,13 @@ class SimulatedInteraction {
         std::min<std::size_t>(static_cast<std::size_t>(next - scene_.times.begin()), scene_.times.size() - 1);
     const Pose world_from_camera = camera.camera_from_world[frame].inverse();
     const Pose own = of_body_[effect] ? scene_.motion[*of_body_[effect]].at(seen.time) : Pose{};
+    const Vector3<double> up = -settled({}, 1).settings().gravity.normalized();
+    if (on_wall_[effect]) {
+      return place_on_wall(*of_body_[effect], camera.camera, own.inverse() * world_from_camera,
+                           own.rotation.conjugate() * up, seen);
+    }
     const Vector3<double> begin = world_from_camera * camera.camera.unproject(seen.pixel, 0);
     const Vector3<double> along = world_from_camera * camera.camera.unproject(seen.pixel, 1) - begin;
-    const Vector3<double> up = -settled({}, 1).settings().gravity.normalized();
     const Vector3<double> sight = world_from_camera.rotation * Vector3<double>::UnitZ();
     Vector3<double> normal = sight - sight.dot(up) * up;
     if (normal.norm() < 0.3) {  // from above: a level plane
@@ -315,6 +325,27 @@ class SimulatedInteraction {
   }
 
  private:
+  /// The place of a body's wall nearest to what was seen, in its frame; of those that are as near as jets are wide the
+  /// highest, since what leaves there falls.
+  std::optional<Vector3<double>> place_on_wall(std::size_t body, const CameraType& camera, const Pose& body_from_camera,
+                                               const Vector3<double>& up, const Sighting& seen) const {
+    constexpr double wide = 0.01;  // [m]
+    const auto& surface = *settled({}, 1).bodies()[static_cast<BodyId>(body)].surface;
+    std::vector<PlaceByRay> places;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Eigen::Vector2d& pixel : seen.squares.empty() ? std::vector{seen.pixel} : seen.squares) {
+      const Vector3<double> begin = body_from_camera * camera.unproject(pixel, 0);
+      if (const auto place = place_by_ray(surface, begin, body_from_camera * camera.unproject(pixel, 1) - begin)) {
+        places.push_back(*place);
+        least = std::min(least, place->distance);
+      }
+    }
+    std::erase_if(places, [&](const PlaceByRay& each) { return each.distance > least + wide; });
+    const auto highest = std::max_element(
+        places.begin(), places.end(), [&](const auto& a, const auto& b) { return up.dot(a.point) < up.dot(b.point); });
+    return highest == places.end() ? std::nullopt : std::optional(highest->point);
+  }
+
   using Picture = Tracker<Model, OpenLoop<typename Model::Scalar, CameraType>, CameraType>;
 
   /// A tracker's drawing, without its tracking.
@@ -470,6 +501,7 @@ class SimulatedInteraction {
   std::vector<Effect> effects_{};
   std::vector<decltype(InteractionEffect<Model>::apply)> apply_{};
   std::vector<std::optional<std::size_t>> of_body_{};
+  std::vector<bool> on_wall_{};
   std::shared_ptr<Starts> starts_;  ///< copies share what they have settled
 };
 

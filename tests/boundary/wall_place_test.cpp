@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Where the parts of a container are that effects act at.
+// Places of walls: what is on their other side, and which are seen.
 
-#include "../../examples/support/pour_places.hpp"
+#include <decant/boundary/wall_place.hpp>
 
 #include <cmath>
+#include <limits>
 
 #include <decant/boundary/bounding_volume_hierarchy.hpp>
 #include <decant/boundary/shapes.hpp>
@@ -11,10 +12,8 @@
 #include "catch.hpp"
 
 using namespace decant;
-using example::detail::wall_place;
-using example::detail::WallPlace;
 
-TEST_CASE("pour places: a wall is where it is, however it leans, and as thick as it is") {
+TEST_CASE("wall place: a wall is where it is, however it leans, and as thick as it is") {
   const Cup cup{0.02, 0.045, 0.09, 0.004};
   const BoundingVolumeHierarchy body(cup.mesh());
   const double height = 0.03, radius = std::lerp(0.02, 0.045, height / 0.09);
@@ -36,7 +35,7 @@ TEST_CASE("pour places: a wall is where it is, however it leans, and as thick as
   CHECK(none.thickness == 0);
 }
 
-TEST_CASE("pour places: a wall that is a surface has no thickness") {
+TEST_CASE("wall place: a wall that is a surface has no thickness") {
   TriangleMesh sheet;
   sheet.vertices = {{0.05, -1, -1}, {0.05, 1, -1}, {0.05, 0, 1}};
   sheet.triangles = {{0, 1, 2}};
@@ -44,4 +43,24 @@ TEST_CASE("pour places: a wall that is a surface has no thickness") {
   CHECK(place.point.x() == Approx(0.05));
   CHECK(place.out.x() == Approx(1));
   CHECK(place.thickness == 0);
+}
+
+TEST_CASE("wall place: a ray shows what it meets first, or what it passes by") {
+  const Vector3<double> middle(0.3, -0.2, 0.1);
+  const BoundingVolumeHierarchy ball(Sphere{middle, 0.05}.mesh());
+  const Vector3<double> origin = middle - Vector3<double>(0.5, 0, 0);
+  const auto met = place_by_ray(ball, origin, {2, 0, 0});
+  REQUIRE(met);
+  CHECK((met->point - (middle - Vector3<double>(0.05, 0, 0))).norm() < 1e-3);
+  CHECK(met->distance == 0);
+  // 8 cm beside its middle, and at a slant: the sphere's point on the perpendicular from there to the ray
+  const Vector3<double> along = Vector3<double>(1, 0.3, 0).normalized(), beside(0, 0, 0.08);
+  const auto passed = place_by_ray(ball, middle + beside - 0.7 * along, 3 * along);
+  REQUIRE(passed);
+  CHECK((passed->point - (middle + Vector3<double>(0, 0, 0.05))).norm() < 3e-3);
+  CHECK(passed->distance == Approx(0.03).margin(5e-4));
+
+  CHECK(!place_by_ray(ball, origin, {-1, 0, 0}));  // it is behind
+  CHECK(!place_by_ray(ball, {std::numeric_limits<double>::quiet_NaN(), 0, 0}, {1, 0, 0}));
+  CHECK(!place_by_ray(ball, origin, {0, 0, std::numeric_limits<double>::infinity()}));
 }
