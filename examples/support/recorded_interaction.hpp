@@ -318,7 +318,8 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
         const Vector3<double> lower = (1 - share) * wall * inside->up;
         const Vector3<double> middle = inside->mouth() - lower;
         const WallPlace place = wall_place(surface, middle, places.lip - lower);
-        of_bodies.push_back(wall_leak_effect<EffectModel>(id, middle, place.point, where + names[k]));
+        of_bodies.push_back(
+            wall_leak_effect<EffectModel>(id, inside->floor, inside->mouth(), place.point, where + names[k]));
       }
       if (inside->has_neck()) {
         of_bodies.push_back(back_pressure_effect<EffectModel>(

@@ -615,7 +615,8 @@ TEST_CASE("simulated interaction: liquid that leaks goes on outside of the wall,
 
 TEST_CASE("simulated interaction: a hole is in the wall that is there, and a jet leaves square to it") {
   auto effects = pour_catalogue();
-  InteractionEffect<PourModel> hole = wall_leak_effect<PourModel>(0, {0, 0, 0.02}, {0.03, 0, 0.02}, "wall of the cup");
+  InteractionEffect<PourModel> hole =
+      wall_leak_effect<PourModel>(0, {0, 0, 0}, {0, 0, 0.07}, {0.03, 0, 0.02}, "wall of the cup");
   hole.name = "of_wall";
   effects.push_back(hole);
   SimulatedInteractionSettings settings;
@@ -656,7 +657,7 @@ TEST_CASE("simulated interaction: a hole is in the wall that is there, and a jet
 TEST_CASE("simulated interaction: a hole is looked for where a wall is nearest to what was seen, and highest") {
   Pour::Scene scene = pour_scene();
   auto effects = pour_catalogue();
-  effects.push_back(wall_leak_effect<PourModel>(0, {0, 0, 0.02}, {0.03, 0, 0.02}, "wall of the cup"));
+  effects.push_back(wall_leak_effect<PourModel>(0, {0, 0, 0}, {0, 0, 0.07}, {0.03, 0, 0.02}, "wall of the cup"));
   SimulatedInteractionSettings settings;
   settings.spacing = 0.009;
   const Pour pour(scene, effects, settings);
@@ -679,7 +680,9 @@ TEST_CASE("simulated interaction: a hole is looked for where a wall is nearest t
       cup.inverse().rotation * Vector3<double>(0, -1, 0) * 0.0295 + Vector3<double>(0, 0, 0.02);
   const auto nearest = pour.place_of(leak, seen({hole}));
   REQUIRE(nearest);
-  CHECK((*nearest - hole).norm() < 0.003);
+  CHECK(nearest->z() == Approx(0.02).margin(0.002));
+  CHECK(nearest->head<2>().norm() == Approx(std::lerp(0.025, 0.03, 2.0 / 7)).margin(3e-4));  // on the inside
+  CHECK(nearest->head<2>().normalized().dot(hole.head<2>().normalized()) > 0.99);
   // a jet from there falls in front of the cup and on
   const Vector3<double> down = cup.inverse().rotation * Vector3<double>(0, 0, -1);
   const auto of_jet = pour.place_of(leak, seen({hole + 0.06 * down, hole + 0.02 * down, hole, hole + 0.01 * down}));
@@ -690,6 +693,10 @@ TEST_CASE("simulated interaction: a hole is looked for where a wall is nearest t
   const auto beside = pour.place_of(leak, seen({Vector3<double>(0, 0, 0.035) + 0.1 * aside}));
   REQUIRE(beside);
   CHECK(beside->normalized().dot(aside) > 0.5);
+  // what is seen beyond its floor comes from its wall, low down
+  const auto below = pour.place_of(leak, seen({Vector3<double>(0.06, 0, -0.08)}));
+  REQUIRE(below);
+  CHECK(below->z() == Approx(0.007).margin(1e-6));
   CHECK(!pour.place_of(leak, Sighting{0, {std::nan(""), 0}, 0, {}}));
 }
 

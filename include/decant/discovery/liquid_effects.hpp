@@ -298,15 +298,22 @@ InteractionEffect<Model> leak_effect(BodyId body, const Vector3<double>& place, 
                                     });
 }
 
-/// A hole anywhere in a wall, through which liquid leaves square to it, at rest or as a jet.
-/// @param inside a point from which the wall is looked at, and @param place about where the hole is: it is where the
-/// wall is seen from the one in the direction of the other; both in the body's frame [m]. @param where in words.
+/// A hole anywhere in a container's wall, through which liquid leaves square to it, at rest or as a jet.
+/// @param floor, mouth middles of the container's inside, lowest and highest: holes are where the wall is seen from the
+/// line between them, square to it, in the direction of a place. @param place where one is looked for first. All in the
+/// body's frame [m]. @param where in words.
 template <class Model>
-InteractionEffect<Model> wall_leak_effect(BodyId body, const Vector3<double>& inside, const Vector3<double>& place,
-                                          std::string where) {
+InteractionEffect<Model> wall_leak_effect(BodyId body, const Vector3<double>& floor, const Vector3<double>& mouth,
+                                          const Vector3<double>& place, std::string where) {
+  const auto seen_in = [body, floor, mouth](const Model& model, const Vector3<double>& direction) {
+    const Vector3<double> axis = mouth - floor;
+    const double height = (direction - floor).dot(axis) / axis.squaredNorm();
+    const double within = std::clamp(height, 0.1, 0.95);  // of a wall, not of a floor or beyond the rim
+    return wall_place(*model.bodies()[body].surface, floor + within * axis, direction + (within - height) * axis);
+  };
   auto effect = detail::hole_effect<
-      Model>(body, place, std::move(where), [body, inside](const Model& model, const Vector3<double>& at) {
-    const WallPlace wall = wall_place(*model.bodies()[body].surface, inside, at);
+      Model>(body, place, std::move(where), [seen_in](const Model& model, const Vector3<double>& at) {
+    const WallPlace wall = seen_in(model, at);
     constexpr double before = 0.004, beyond = 0.009;  // [m], clear of the wall by particles of usual spacings
     return detail::Hole{wall.point - before * wall.out, wall.point + (wall.thickness + beyond) * wall.out, wall.out};
   });
@@ -315,7 +322,7 @@ InteractionEffect<Model> wall_leak_effect(BodyId body, const Vector3<double>& in
       "beyond_the_wall, ^ * out_of_it});";
   effect.place_tolerance = 0.03;
   effect.fastest = 1.2;  // of water that stands 7 cm above the hole (Torricelli)
-  effect.on_wall = true;
+  effect.on_wall = [seen_in](const Model& model, const Vector3<double>& near) { return seen_in(model, near).point; };
   return effect;
 }
 

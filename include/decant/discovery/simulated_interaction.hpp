@@ -97,7 +97,8 @@ struct InteractionChanges {
 template <class Model>
 struct InteractionEffect : Effect {
   std::optional<std::size_t> of_body{};  ///< in whose frame its place is; the world's otherwise
-  bool on_wall = false;                  ///< it acts at that body's wall, wherever that may be
+  /// If it acts at that body's wall, wherever that may be: where, of a place near it.
+  std::function<Vector3<double>(const Model& model, const Vector3<double>& near)> on_wall{};
   std::function<void(const AppliedEffect& as, InteractionChanges<Model>& changes)> apply{};
 };
 
@@ -232,8 +233,9 @@ class SimulatedInteraction {
     const Pose own = of_body_[effect] ? scene_.motion[*of_body_[effect]].at(seen.time) : Pose{};
     const Vector3<double> up = -settled({}, 1).settings().gravity.normalized();
     if (on_wall_[effect]) {
-      return place_on_wall(*of_body_[effect], camera.camera, own.inverse() * world_from_camera,
-                           own.rotation.conjugate() * up, seen);
+      const auto nearest = nearest_of_wall(*of_body_[effect], camera.camera, own.inverse() * world_from_camera,
+                                           own.rotation.conjugate() * up, seen);
+      return nearest ? std::optional(on_wall_[effect](settled({}, 1), *nearest)) : std::nullopt;
     }
     const Vector3<double> begin = world_from_camera * camera.camera.unproject(seen.pixel, 0);
     const Vector3<double> along = world_from_camera * camera.camera.unproject(seen.pixel, 1) - begin;
@@ -327,8 +329,9 @@ class SimulatedInteraction {
  private:
   /// The place of a body's wall nearest to what was seen, in its frame; of those that are as near as jets are wide the
   /// highest, since what leaves there falls.
-  std::optional<Vector3<double>> place_on_wall(std::size_t body, const CameraType& camera, const Pose& body_from_camera,
-                                               const Vector3<double>& up, const Sighting& seen) const {
+  std::optional<Vector3<double>> nearest_of_wall(std::size_t body, const CameraType& camera,
+                                                 const Pose& body_from_camera, const Vector3<double>& up,
+                                                 const Sighting& seen) const {
     constexpr double wide = 0.01;  // [m]
     const auto& surface = *settled({}, 1).bodies()[static_cast<BodyId>(body)].surface;
     std::vector<PlaceByRay> places;
@@ -501,7 +504,7 @@ class SimulatedInteraction {
   std::vector<Effect> effects_{};
   std::vector<decltype(InteractionEffect<Model>::apply)> apply_{};
   std::vector<std::optional<std::size_t>> of_body_{};
-  std::vector<bool> on_wall_{};
+  std::vector<decltype(InteractionEffect<Model>::on_wall)> on_wall_{};
   std::shared_ptr<Starts> starts_;  ///< copies share what they have settled
 };
 
