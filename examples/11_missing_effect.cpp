@@ -54,7 +54,7 @@ int main(int count, char** values) {
   std::printf("The other pour %s.\n", result.confirmation == Confirmation::Confirmed ? "agrees" : "does not agree");
 
   // the mended model; a Tracker takes it from here as well
-  const ModelRun mended{{found.applied()}, 1};
+  const ModelRun mended{result.mended(), 1};
   const double before = overlap_gap(other.seen.silhouettes, other.model.predict({{}, 1}).silhouettes);
   const double after = overlap_gap(other.seen.silhouettes, other.model.predict(mended).silhouettes);
   const example::EffectModel simulator = other.model.started(mended);

@@ -200,8 +200,11 @@ int main(int count, char** values) {
       }
       places = example::named_places(interactions, result);
     });
-    std::printf("%s\n%s\n%s%s%s", example::missing_effect_sentence(result.judged, result).c_str(),
-                example::references_sentence(reference_folders.size(), result).c_str(),
+    std::printf("%s\n", example::missing_effect_sentence(result.judged, result).c_str());
+    if (!result.surroundings.empty()) {
+      std::printf("%s\n", example::surroundings_sentence(result.judged, result).c_str());
+    }
+    std::printf("%s\n%s%s%s", example::references_sentence(reference_folders.size(), result).c_str(),
                 example::gap_table(result).text().c_str(),
                 example::where_table(learn_folders, result, places).text().c_str(),
                 example::candidates_table(result.judged, result).text().c_str());

@@ -203,6 +203,17 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   return text;
 }
 
+/// What was taken to be there, though nobody said so; empty if nothing was.
+inline std::string surroundings_sentence(const std::vector<decant::Effect>& effects,
+                                         const decant::MissingEffect& result) {
+  std::string text;
+  for (const decant::AppliedEffect& each : result.surroundings) {
+    text += text.empty() ? "It is taken that " : ", and that ";
+    text += effects.at(each.effect).meaning;
+  }
+  return text.empty() ? text : text + ": by that, what may be missing explains more.";
+}
+
 /// What the answer owes to references.
 inline std::string references_sentence(std::size_t references, const decant::MissingEffect& result) {
   if (references == 0) {
@@ -319,6 +330,10 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
   json["told_apart_by_held_out"] = result.told_apart_by_others;
   json["taught_by"] = result.taught_by;
   json["lessons"] = result.lessons;
+  json["surroundings"] = nlohmann::json::array();
+  for (const decant::AppliedEffect& each : result.surroundings) {
+    json["surroundings"].push_back(effects.at(each.effect).name);
+  }
   json["runs"] = result.runs;
   return json;
 }

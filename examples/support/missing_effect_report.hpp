@@ -88,6 +88,7 @@ inline std::vector<ComparedModel> compared_models(const std::vector<const Record
   }
   if (!added.empty()) {
     ComparedModel& with = models.emplace_back();
+    with.effects = result.surroundings;
     for (const decant::RefinedEffect& each : added) {
       with.name += with.name.empty() ? "with " : " and ";
       with.name += detail::effect_words(result.judged, each);
@@ -310,6 +311,9 @@ inline void write_missing_effect_report(const std::string& file,
     const std::string code = detail::effect_code(effects, each);
     report.paragraph(effects[each.judged].words() + ": " + effects[each.judged].meaning + "." +
                      (code.empty() ? "" : " In the model: " + code));
+  }
+  if (!result.surroundings.empty()) {
+    report.paragraph(surroundings_sentence(effects, result));
   }
   report.heading("The gap");
   report.table(gap_table(result));

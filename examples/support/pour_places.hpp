@@ -87,6 +87,28 @@ inline std::pair<decant::Vector3<double>, decant::Vector3<double>> lip_of(const 
   return {lip, tilted * lip};
 }
 
+/// Whether a body stays where it is, as well as cameras tell poses.
+inline bool stands(const decant::recording::Body& body) {
+  const decant::Pose first = body.motion.at(0);
+  constexpr double shift = 0.003, turn = 0.02;  // [m], [rad]
+  return std::all_of(body.motion.samples().begin(), body.motion.samples().end(), [&](const auto& sample) {
+    return (sample.pose.translation - first.translation).norm() <= shift &&
+           sample.pose.rotation.angularDistance(first.rotation) <= turn;
+  });
+}
+
+/// What a body stands on: below its middle, as low as it gets [m], world frame.
+inline decant::Vector3<double> foot_of(const decant::recording::Body& body, double time,
+                                       const decant::Vector3<double>& up) {
+  const decant::Pose pose = body.motion.at(time);
+  const decant::Vector3<double> middle = pose * decant::BoundingVolumeHierarchy(body.mesh).bounds().center();
+  double lowest = 0;
+  for (const auto& vertex : body.mesh.vertices) {
+    lowest = std::min(lowest, up.dot(pose * vertex - middle));
+  }
+  return middle + lowest * up;
+}
+
 /// The containers of a pour, and about where it goes.
 struct PourPlaces {
   std::vector<std::optional<Inside>> inside{};                    ///< by body

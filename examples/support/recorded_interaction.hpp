@@ -369,6 +369,12 @@ inline std::vector<decant::InteractionEffect<EffectModel>> catalogue_of(const de
   for (auto& effect : out_of_sight) {
     effects.push_back(std::move(effect));
   }
+  for (const recording::Body& body : recording.bodies) {
+    if (body.role == recording::Role::Target && stands(body)) {
+      effects.push_back(table_effect<EffectModel>(foot_of(body, begin, up), recording.gravity));
+      break;
+    }
+  }
   return effects;
 }
 

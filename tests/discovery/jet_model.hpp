@@ -31,6 +31,7 @@ struct Jet {
   double tap = 0, tap_x = 0, tap_y = 0;            ///< more balls, that drop from there: how many a second; [m]
   double gust_from = 0.4, gust_until = 0.6;        ///< [s]
   double beat_from = 0, beat_until = 0;            ///< one of the pull's, if it has any [s]
+  double shelf = -1;                               ///< how high a shelf below the nozzle is, if there is one [m]
 };
 
 /// @param seed of where each ball leaves the nozzle, and how fast. @param angle of the nozzle [rad].
@@ -67,6 +68,9 @@ inline std::vector<decant::SilhouetteSeries> film_of(const Jet& jet, std::uint32
           ball.v += step * (-9.81 - jet.drag * ball.v);
           ball.x += step * ball.u;
           ball.y += step * ball.v;
+          if (ball.y < jet.shelf && ball.x < 0.25) {
+            ball = {ball.born, ball.x, jet.shelf, ball.x < jet.tap_x ? -0.15 : 0.15, 0};  // along it, both ways
+          }
         }
       }
     }
@@ -147,11 +151,13 @@ class JetModel {
                     .tap_x = tap.x(),
                     .tap_y = tap.y(),
                     .beat_from = beat.from,
-                    .beat_until = beat.until},
+                    .beat_until = beat.until,
+                    .shelf = shelf},
                    run.seed, angle_);
   }
 
   double broken_above = 1e9;  ///< of drag: runs fail
+  double shelf = -1;          ///< see Jet
 
  private:
   double angle_;

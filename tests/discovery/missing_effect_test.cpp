@@ -183,6 +183,30 @@ class Blend {
   std::vector<Effect> effects_{JetModel().effects()[0], JetModel().effects()[3], JetModel().effects()[0]};
 };
 
+/// Knows that there may be a shelf.
+class WithShelf {
+ public:
+  WithShelf(double angle, const Vector3<double>& tap) : without_(angle, tap), with_(angle, tap) {
+    with_.shelf = 0.1;
+    effects_.push_back(plain_effect("shelf", "", "", "", {"", 0, 0, 1}));
+    effects_.back().kind = EffectKind::Surroundings;
+  }
+  const std::vector<Effect>& effects() const noexcept { return effects_; }
+  std::vector<SilhouetteSeries> predict(ModelRun run) const {
+    const bool has = std::erase_if(run.effects, [this](const AppliedEffect& each) {
+                       return each.effect + 1 == effects_.size() && each.strength[0] > 0;
+                     }) > 0;
+    return has ? with_.predict(run) : without_.predict(run);
+  }
+  std::optional<Vector3<double>> place_of(std::size_t effect, const Sighting& seen) const {
+    return without_.place_of(effect, seen);
+  }
+
+ private:
+  LocatingJetModel without_, with_;
+  std::vector<Effect> effects_{without_.effects()};
+};
+
 /// Knows that there is no tap.
 class WithoutTap : public LocatingJetModel {
  public:
@@ -236,6 +260,41 @@ TEST_CASE("missing effect: where all else may be chance, what an effect takes aw
   CHECK(relative_fall(result.learn.before, result.refined.front().distance) > result.learn.by_chance);
   CHECK((result.verdict == Verdict::Named || result.verdict == Verdict::OneOf));
   CHECK(name_of(result) == "speed");
+}
+
+TEST_CASE("missing effect: what may be around is taken to be there where what is missing explains more with it") {
+  const Vector3<double> usual(0.13, 0.55, 0);
+  const WithShelf model(0.9, usual), other(0.6, usual);
+  const std::size_t shelf = model.effects().size() - 1;
+  ThreadExecutor executor{{1}};
+  const auto found = [&](const Jet& jet) {
+    return MissingEffectSearch<WithShelf>({{"a", &model, film_of(jet, 31, 0.9)}},
+                                          {{"b", &other, film_of(jet, 32, 0.6)}}, run_jobs_on(executor))
+        .find();
+  };
+  Jet tapped;
+  tapped.tap = 25;
+  tapped.tap_x = usual.x();
+  tapped.tap_y = usual.y();
+  Jet caught = tapped;
+  caught.shelf = 0.1;
+  const MissingEffect on_shelf = found(caught), past_it = found(tapped);
+  REQUIRE(on_shelf.found.size() == 1);
+  CHECK(model.effects()[on_shelf.found.front().effect].name == "tap");
+  REQUIRE(on_shelf.surroundings.size() == 1);
+  CHECK(on_shelf.surroundings.front().effect == shelf);
+  CHECK(on_shelf.surroundings.front().strength[0] == 1);
+  CHECK(on_shelf.confirmation == Confirmation::Confirmed);
+  CHECK(on_shelf.held_out.share() > 0.9);
+  CHECK(std::abs(on_shelf.found.front().strength[0] - 25) < 3);
+  REQUIRE(on_shelf.mended().size() == 2);
+  CHECK(on_shelf.mended()[0].effect == shelf);
+  CHECK(on_shelf.mended()[1].effect == on_shelf.found.front().effect);
+  // and is not, where it does not help, or nothing would meet it
+  REQUIRE(past_it.found.size() == 1);
+  CHECK(model.effects()[past_it.found.front().effect].name == "tap");
+  CHECK(past_it.surroundings.empty());
+  CHECK(found({0.5}).surroundings.empty());
 }
 
 TEST_CASE(

@@ -18,6 +18,7 @@
 #include <decant/boundary/shapes.hpp>
 #include <decant/camera/pinhole_camera.hpp>
 #include <decant/discovery/disagreement_place.hpp>
+#include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/liquid_effects.hpp>
 #include <decant/discovery/simulated_interaction.hpp>
 #include <decant/simulation/fill.hpp>
@@ -652,6 +653,37 @@ TEST_CASE("simulated interaction: a hole is in the wall that is there, and a jet
   CHECK(pour.started(run_with(pour, "of_wall", {40})).fluid().size() > 0);
   hole.of_body.reset();
   CHECK_THROWS_WITH(Pour(pour_scene(), {hole}, settings), decant_test::contains("of_body"));
+}
+
+TEST_CASE("simulated interaction: what misses the containers falls for good, or onto a table") {
+  auto effects = pour_catalogue();
+  const Vector3<double> aside(0.3, 0, 0.1), top(0.2, 0.1, -0.03);
+  effects.push_back(inflow_effect<PourModel>(aside, 2, "beside all"));
+  effects.back().name = "stray";
+  effects.push_back(table_effect<PourModel>(top));
+  CHECK(effects.back().kind == EffectKind::Surroundings);
+  CHECK(plan_dictionary({effects.back()}).size() == plan_dictionary(std::vector<Effect>()).size());  // none with it
+  SimulatedInteractionSettings settings;
+  settings.spacing = 0.009;
+  const Pour pour(pour_scene(), effects, settings);
+  for (const bool there : {false, true}) {
+    ModelRun run = run_with(pour, "stray", {40});
+    if (there) {
+      run.effects.push_back(run_with(pour, "table", {1}).effects.front());
+    }
+    PourModel model = pour.started(run);
+    for (int frame = 0; frame < 40; ++frame) {
+      REQUIRE(model.step(0.0125).advanced());
+    }
+    const double lowest = model.fluid().position.row(2).minCoeff();
+    INFO("lowest " << lowest);
+    if (there) {
+      CHECK(lowest > top.z());
+      CHECK(lowest < top.z() + 0.009);
+    } else {
+      CHECK(lowest < top.z() - 0.3);
+    }
+  }
 }
 
 TEST_CASE("simulated interaction: a hole is looked for where a wall is nearest to what was seen, and highest") {

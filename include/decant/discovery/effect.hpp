@@ -37,8 +37,10 @@ struct EffectComponent {
 enum class EffectKind {
   Physics,      ///< of the liquid, its surroundings or its amount
   Measurement,  ///< late poses, a camera that was moved: the world is as the model has it
-  Nuisance,  ///< a measurement's too, but only ever taken account of, not named: what it explains nothing else has to
-  Tolerated  ///< known not to be missing: drawn within its tolerance, and never looked for
+  Nuisance,   ///< a measurement's too, but only ever taken account of, not named: what it explains nothing else has to
+  Tolerated,  ///< known not to be missing: drawn within its tolerance, and never looked for
+  Surroundings  ///< there or not, such as a table: taken to be there where what seems to be missing explains more with
+                ///< it, not named; of one component, from none of it to all
 };
 
 /// What a camera sees first of an effect that acts at a place, there.

@@ -71,6 +71,9 @@ inline std::vector<PlannedRun> plan_dictionary(const std::vector<Effect>& effect
   for (std::size_t which = 0; which < effects.size(); ++which) {
     const Effect& effect = effects[which];
     validate(effect);
+    if (effect.kind == EffectKind::Surroundings) {
+      continue;
+    }
     for (std::size_t component = 0; component < effect.components.size(); ++component) {
       const EffectComponent& of = effect.components[component];
       const auto add = [&](RunRole role, double strength, std::uint32_t with) {

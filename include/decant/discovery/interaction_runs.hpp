@@ -3,6 +3,7 @@
 
 /// Recordings with the models that predict them, and runs of these on an executor.
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -13,6 +14,7 @@
 
 #include <decant/core/expects.hpp>
 #include <decant/core/target.hpp>
+#include <decant/discovery/effect.hpp>
 #include <decant/discovery/effect_dictionary.hpp>
 #include <decant/discovery/forward_model.hpp>
 #include <decant/discovery/observation.hpp>
@@ -52,16 +54,22 @@ class InteractionRuns {
 
   explicit InteractionRuns(RunJobs run_jobs) : run_jobs_(std::move(run_jobs)) {}
 
+  /// From now on all runs have an effect, if their model knows of it, that are not asked to have it at some strength.
+  /// @param effect which one, by its words.
+  void surround(const Effect& effect, AppliedEffect as) { always_.emplace_back(effect.words(), std::move(as)); }
+
   /// Runs of several interactions, in their order; those that failed are empty. Where all that is tolerated is drawn,
   /// what sensors err by is, too.
   std::vector<Observation> operator()(const std::vector<Run>& runs) {
     std::vector<std::string> keys;
+    std::vector<ModelRun> own;
     std::vector<std::size_t> job_of, first;  // equal runs are made once
     std::map<std::string, std::size_t> number;
     for (std::size_t k = 0; k < runs.size(); ++k) {
       const Interaction<Model>& of = *runs[k].first;
       std::string key = of.of_model.empty() ? of.name : of.of_model;
-      key += ": " + run_key(of.model->effects(), of.numbers.in_model(runs[k].second));
+      own.push_back(surrounded(of, runs[k].second));
+      key += ": " + run_key(of.model->effects(), own.back());
       const auto [place, is_new] = number.try_emplace(key, keys.size());
       if (is_new) {
         keys.push_back(std::move(key));
@@ -70,8 +78,7 @@ class InteractionRuns {
       job_of.push_back(place->second);
     }
     const std::vector<JobResult> results = run_jobs_(keys, [&](std::size_t job) {
-      const auto& [interaction, run] = runs[first[job]];
-      return Observation(interaction->model->predict(interaction->numbers.in_model(run))).numbers();
+      return Observation(runs[first[job]].first->model->predict(own[first[job]])).numbers();
     });
     made_ += keys.size();
     std::vector<Observation> seen;
@@ -89,7 +96,26 @@ class InteractionRuns {
   std::size_t made() const noexcept { return made_; }  ///< of different runs, in all calls together
 
  private:
+  /// A run as its model is asked for it.
+  ModelRun surrounded(const Interaction<Model>& of, const ModelRun& run) const {
+    ModelRun own = of.numbers.in_model(run);
+    const std::vector<Effect>& effects = of.model->effects();
+    for (const auto& [words, as] : always_) {
+      const auto known = std::find_if(effects.begin(), effects.end(),
+                                      [&words = words](const Effect& each) { return each.words() == words; });
+      const auto number = static_cast<std::size_t>(known - effects.begin());
+      const bool is_asked_for = std::any_of(own.effects.begin(), own.effects.end(),
+                                            [&](const AppliedEffect& each) { return each.effect == number; });
+      if (known != effects.end() && !is_asked_for) {
+        own.effects.push_back(as);
+        own.effects.back().effect = number;
+      }
+    }
+    return own;
+  }
+
   RunJobs run_jobs_;
+  std::vector<std::pair<std::string, AppliedEffect>> always_{};
   std::size_t made_ = 0;
 };
 

@@ -15,12 +15,14 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <decant/boundary/pipe_blockage.hpp>
 #include <decant/boundary/pipe_section.hpp>
 #include <decant/boundary/shapes.hpp>
 #include <decant/boundary/wall_place.hpp>
 #include <decant/core/expects.hpp>
+#include <decant/core/pose.hpp>
 #include <decant/core/target.hpp>
 #include <decant/core/types.hpp>
 #include <decant/discovery/effect.hpp>
@@ -379,6 +381,24 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
           own.flow = detail::steady(as.strength[0], in_model_time(*as.window, model, first));
           own.direction = model.settings().gravity;
           model.add_inlet(own, origin);
+        });
+      });
+}
+
+/// A level table that containers stand on, which liquid that misses them lies on: as a rule nobody records it.
+/// @param place a point of its top [m], world frame, about which it reaches 0.4 m. @param gravity that the model has
+/// [m/s^2], not 0.
+template <class Model>
+InteractionEffect<Model> table_effect(const Vector3<double>& place, const Vector3<double>& gravity = {0, 0, -9.81}) {
+  Effect effect = plain_effect("table", "", "", "what misses the containers lies on a table", {"", 0, 0, 1},
+                               "simulator.add_body(\"table\", box under {#});");
+  effect.place = place;
+  const Pose pose{Eigen::Quaterniond::FromTwoVectors(Vector3<double>::UnitZ(), -gravity), place};
+  return detail::run_effect<Model>(
+      std::move(effect), EffectKind::Surroundings, [pose](const AppliedEffect&, InteractionChanges<Model>& changes) {
+        changes.of_model.push_back([pose](Model& model) {
+          constexpr double reach = 0.4, thickness = 0.03;  // [m]
+          model.add_body("table", Box{{-reach, -reach, -thickness}, {reach, reach, 0}}, PoseTrack(pose));
         });
       });
 }

@@ -105,11 +105,21 @@ struct MissingEffect {
   std::vector<SmallestSeen> smallest_seen{};                   ///< of each effect that is judged
   GapChange learn{}, held_out{};
   Confirmation confirmation = Confirmation::Untested;
+  std::vector<AppliedEffect> surroundings{};  ///< that were taken to be there, see EffectKind
   std::size_t taught_by = 0;  ///< references that look like each of the recordings: these are compared without what
                               ///< reality does differently all the same
   std::size_t lessons = 0;    ///< references of other interactions whose ReferenceLesson was taken off, where none look
                               ///< alike
   std::size_t runs = 0;       ///< of models
+
+  /// The mended model is one that runs with these.
+  std::vector<AppliedEffect> mended() const {
+    std::vector<AppliedEffect> all = surroundings;
+    for (const RefinedEffect& each : found) {
+      all.push_back(each.applied());
+    }
+    return all;
+  }
 };
 
 }  // namespace decant::inline DECANT_TARGET
