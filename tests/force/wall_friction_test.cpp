@@ -136,6 +136,28 @@ TEST_CASE("wall friction between walls: each counts by how near it is") {
   CHECK(hidden.velocity_after(100, 0.01)[2] == Approx(std::exp(-0.2)));
 }
 
+TEST_CASE("wall friction: a body may be rougher than others") {
+  const double step = 0.01;
+  AtWall<double> corner({1, 0, 1}, 0.5);  // of the floor, body 0, and a wall across x, body 7
+  corner.add({100, 0, 0}, {0, 0, 0});
+  corner.liquid.walls.contacts_of(0)[1].body = 7;
+  const auto after = [&](double rate, double at_wall) {
+    decant::WallFriction<double> force;
+    force.rate = rate;
+    force.rougher = {{3, 1e3}, {7, at_wall}};
+    corner.liquid.time_step = step;
+    decant::PointArray<double> acceleration = decant::PointArray<double>::Zero(3, 1);
+    force.accumulate(corner.liquid.view(), acceleration);
+    return decant::Vector3<double>(corner.liquid.fluid.velocity.col(0) + step * acceleration.col(0));
+  };
+  // the wall slows what goes up, the floor what goes along x
+  CHECK(after(100, 40)[0] == Approx(std::exp(-1.0)));
+  CHECK(after(100, 40)[2] == Approx(std::exp(-1.4)));
+  CHECK(after(0, 40)[0] == 1);
+  CHECK(after(0, 40)[2] == Approx(std::exp(-0.4)));
+  CHECK(after(0, -40)[2] == 1);
+}
+
 TEMPLATE_TEST_CASE("wall friction of less than nothing, none or NaN changes no bit", "", float, double) {
   const decant::Vector3<double> v(1, 2, 3);
   for (const double rate : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {

@@ -385,7 +385,10 @@ InteractionEffect<Model> inflow_effect(const Vector3<double>& place, Origin orig
       });
 }
 
-/// A level table that containers stand on, which liquid that misses them lies on: as a rule nobody records it.
+/// A level table that containers stand on, which liquid that misses them lies on: as a rule nobody records it. What
+/// falls on it spreads as a film that its boundary layer slows down within centimetres (the hydraulic jump of 25 ml/s
+/// of water has a radius of 4 cm: Bohr, Dimon and Putkaradze, J. Fluid Mech. 254, 1993), which particles do not
+/// resolve: it is slowed as much at the table.
 /// @param place a point of its top [m], world frame, about which it reaches 0.4 m. @param gravity that the model has
 /// [m/s^2], not 0.
 template <class Model>
@@ -398,7 +401,11 @@ InteractionEffect<Model> table_effect(const Vector3<double>& place, const Vector
       std::move(effect), EffectKind::Surroundings, [pose](const AppliedEffect&, InteractionChanges<Model>& changes) {
         changes.of_model.push_back([pose](Model& model) {
           constexpr double reach = 0.4, thickness = 0.03;  // [m]
-          model.add_body("table", Box{{-reach, -reach, -thickness}, {reach, reach, 0}}, PoseTrack(pose));
+          const BodyId table =
+              model.add_body("table", Box{{-reach, -reach, -thickness}, {reach, reach, 0}}, PoseTrack(pose));
+          constexpr double friction = 40;  // [1/s]: what arrives at 1.6 m/s comes 4 cm
+          model.template force<WallFriction<typename Model::Scalar>>().rougher.emplace_back(
+              table, static_cast<typename Model::Scalar>(friction));
         });
       });
 }

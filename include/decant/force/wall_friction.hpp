@@ -5,8 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
+#include <vector>
 
+#include <decant/boundary/concept.hpp>
 #include <decant/boundary/wall_state.hpp>
 #include <decant/core/parallel.hpp>
 #include <decant/core/target.hpp>
@@ -43,10 +47,12 @@ struct WallFriction {
 
   Scalar rate = 0;   ///< [1/s], >= 0
   Scalar depth = 1;  ///< of what touches a wall [spacings], > 0
+  /// Bodies that are rougher than the others, with how much is added to the rate at them [1/s], >= 0.
+  std::vector<std::pair<BodyId, Scalar>> rougher{};
 
   template <class Step>
   void accumulate(const Step& step, PointArray<Scalar>& acceleration) noexcept {
-    if (!(rate > 0) || !(step.time_step > 0)) {
+    if ((!(rate > 0) && rougher.empty()) || !(step.time_step > 0)) {
       return;
     }
     const Scalar deepest = depth * step.spacing;
@@ -63,6 +69,14 @@ struct WallFriction {
   }
 
  private:
+  Scalar rate_at(std::uint32_t body) const noexcept {
+    Scalar all = rate > 0 ? rate : Scalar(0);
+    for (const auto& [rough, more] : rougher) {
+      all += rough == body && more > 0 ? more : Scalar(0);
+    }
+    return all;
+  }
+
   template <class Step>
   void slow(const Step& step, Index i, PointArray<Scalar>& acceleration) const noexcept {
     const WallContact<Scalar>* contacts = step.walls.contacts_of(i);
@@ -75,7 +89,10 @@ struct WallFriction {
       }
       const Vector3<Scalar> normal = contacts[k].gradient / steepness;
       const Vector3<Scalar> past = velocity - contacts[k].velocity;
-      const Scalar own_rate = rate * std::min(steepness / steepest, Scalar(1));
+      const Scalar own_rate = rate_at(contacts[k].body) * std::min(steepness / steepest, Scalar(1));
+      if (!(own_rate > 0)) {
+        continue;
+      }
       const Scalar mean_rate = -std::expm1(-own_rate * step.time_step) / step.time_step;
       const Vector3<Scalar> pull = -mean_rate * (past - past.dot(normal) * normal);
       velocity += step.time_step * pull;
