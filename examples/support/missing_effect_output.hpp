@@ -51,7 +51,8 @@ inline nlohmann::json components_json(const Eigen::VectorXd& values) {
   return json.size() == 1 ? json.front() : json;
 }
 
-inline std::string components_text(const Eigen::VectorXd& values) {
+template <class Vector>
+std::string components_text(const Vector& values) {
   std::string text;
   for (const double value : values) {
     text += text.empty() ? "" : ", ";

@@ -624,7 +624,6 @@ TEST_CASE("simulated interaction: a hole is in the wall that is there, and a jet
   settings.spacing = 0.009;
   const Pour pour(pour_scene(), effects, settings);
   ModelRun run = run_with(pour, "of_wall", {40});
-  const Cup cup{0.025, 0.03, 0.07, 0.003};
   for (const double turn : {0.0, 2.0, 4.0}) {
     for (const double radius : {0.02, 0.05}) {  // a place off the wall means that which is behind it, or before it
       const Vector3<double> out(std::cos(turn), std::sin(turn), 0);
