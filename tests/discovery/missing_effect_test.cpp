@@ -183,6 +183,23 @@ class Blend {
   std::vector<Effect> effects_{JetModel().effects()[0], JetModel().effects()[3], JetModel().effects()[0]};
 };
 
+/// Has its tap on a rail, wherever it is said to be.
+class OnRail : public LocatingJetModel {
+ public:
+  static constexpr double height = 0.65;
+  using LocatingJetModel::LocatingJetModel;
+  Vector3<double> placed(std::size_t, const Vector3<double>& place) const { return {place.x(), height, 0}; }
+  std::vector<SilhouetteSeries> predict(ModelRun run) const {
+    for (AppliedEffect& each : run.effects) {
+      if (each.place) {
+        each.place = placed(each.effect, *each.place);
+      }
+    }
+    return LocatingJetModel::predict(run);
+  }
+};
+static_assert(PlacingModel<OnRail> && !PlacingModel<LocatingJetModel>);
+
 /// Knows that there may be a shelf.
 class WithShelf {
  public:
@@ -590,6 +607,20 @@ TEST_CASE("missing effect: what is elsewhere than it usually is is found where r
     CHECK(other.verdict == Verdict::Unexplained);
     CHECK(other.judged.size() == 6);  // none where the recording begins to disagree
   }
+}
+
+TEST_CASE("missing effect: what acts at certain places only is looked for there") {
+  const Jet hidden{0, 0, 1, 0, 0, 0, 25, 0.3, OnRail::height};
+  const OnRail model(0.9, Vector3<double>(0.15, 0.6, 0));
+  ThreadExecutor executor{{1}};
+  const MissingEffect found =
+      MissingEffectSearch<OnRail>({{"a", &model, film_of(hidden, 71, 0.9)}}, {}, run_jobs_on(executor)).find();
+  REQUIRE(found.found.size() == 1);
+  const RefinedEffect& tap = found.found.front();
+  CHECK(model.effects()[tap.effect].name == "tap");
+  REQUIRE(tap.place);
+  CHECK(tap.place->x() == Approx(0.3).margin(0.04));
+  CHECK(tap.place->y() == Approx(OnRail::height).margin(1e-6));
 }
 
 TEST_CASE(

@@ -127,6 +127,16 @@ class EffectPoint {
     }
     return of.effect->components[static_cast<std::size_t>(k - of.begin)].limits();
   }
+  /// The same with an effect elsewhere, kept in its range. @param place [m]; the effect has one that is looked for.
+  EffectPoint with_place(std::size_t part, const Vector3<double>& place) const {
+    const Part& of = parts_.at(part);
+    expects(of.coordinates > 0, "EffectPoint: place", "of an effect whose place is looked for", place.transpose());
+    EffectPoint other = *this;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      other = other.with(of.place() + axis, place[axis]);
+    }
+    return other;
+  }
   /// The same with one number changed, kept in its range.
   EffectPoint with(Eigen::Index k, double value) const {
     EffectPoint other = *this;

@@ -372,8 +372,23 @@ class EffectRefiner {
         each.path.fail();
       } else {
         each.path.step(std::move(views), features, known.chance);
+        each.path.stand_at(placed(each.path.point()));
       }
     }
+  }
+
+  /// Places that are off where effects can act drift, as nothing says how far off; and the nearer to a container's
+  /// middle a place is, the farther along its wall a step of it goes.
+  EffectPoint placed(EffectPoint point) const {
+    if constexpr (PlacingModel<Model>) {
+      for (std::size_t part = 0; part < point.effects(); ++part) {
+        const AppliedEffect applied = point.applied(part);
+        if (applied.place) {
+          point = point.with_place(part, of_->front().model->placed(applied.effect, *applied.place));
+        }
+      }
+    }
+    return point;
   }
 
   /// @param seen of runs at the point, then below and above of each of its numbers that is not held.

@@ -144,4 +144,11 @@ concept LocatingModel = ForwardModel<M> && requires(const M& model, std::size_t 
   { model.place_of(effect, sighting) } -> std::same_as<std::optional<Vector3<double>>>;
 };
 
+/// One in which effects act at certain places only, such as those of a wall: placed(effect, place), the one of these
+/// that a place stands for [m], in the model's own frame for the effect.
+template <class M>
+concept PlacingModel = ForwardModel<M> && requires(const M& model, std::size_t effect, const Vector3<double>& place) {
+  { model.placed(effect, place) } -> std::same_as<Vector3<double>>;
+};
+
 }  // namespace decant::inline DECANT_TARGET

@@ -38,6 +38,8 @@ class RefinementPath {
   double least_distance() const noexcept { return nearest_.distance; }
 
   void settle() noexcept { settled_ = true; }
+  /// Runs are needed at another point that stands for the same run.
+  void stand_at(EffectPoint point) { point_ = point.rounded(); }
   /// Runs at the point fail.
   void fail() {
     views_.clear();

@@ -255,6 +255,11 @@ class SimulatedInteraction {
     return own.inverse() * place;
   }
 
+  /// Where an effect acts of which a place is asked for: what acts at a wall, at its wall.
+  Vector3<double> placed(std::size_t effect, const Vector3<double>& place) const {
+    return on_wall_.at(effect) ? on_wall_[effect](settled({}, 1), place) : place;
+  }
+
   /// The model of a run as it starts: its clock stands at what is the first frame's time, its bodies are in motion.
   Model started(const ModelRun& run) const {
     const auto [changes, discretisation] = this->changes(run);
