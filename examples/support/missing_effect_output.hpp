@@ -164,13 +164,13 @@ inline std::string missing_effect_sentence(const std::vector<decant::Effect>& ef
   }
   if (result.verdict == Verdict::Unexplained) {
     std::string text = "There is a gap that no effect of the catalogue explains";
-    if (!result.refined.empty()) {
+    if (const decant::RefinedEffect* nearest = result.nearest()) {
       text += "; nearest is ";
-      text += detail::effect_words(effects, result.refined.front());
+      text += detail::effect_words(effects, *nearest);
       text += ", which explains ";
-      text += decant::detail::fixed_text(100 * result.refined.front().share, 0);
+      text += decant::detail::fixed_text(100 * nearest->share, 0);
       text += " % of what is reducible";
-      if (const double grown = 100 * result.refined.front().grown; grown >= 1) {
+      if (const double grown = 100 * nearest->grown; grown >= 1) {
         text += ", but at some times makes the gap grow, by " + decant::detail::fixed_text(grown, 0) + " %";
       }
     }
@@ -328,6 +328,8 @@ inline nlohmann::json missing_effect_json(const std::vector<decant::Effect>& eff
                       : result.confirmation == Confirmation::Refuted     ? nlohmann::json(false)
                       : result.confirmation == Confirmation::NotTestable ? nlohmann::json("not_testable")
                                                                          : nlohmann::json();
+  const decant::RefinedEffect* nearest = result.verdict == Verdict::Unexplained ? result.nearest() : nullptr;
+  json["nearest"] = nearest != nullptr ? nlohmann::json(effects.at(nearest->judged).name) : nlohmann::json();
   json["told_apart_by_held_out"] = result.told_apart_by_others;
   json["taught_by"] = result.taught_by;
   json["lessons"] = result.lessons;

@@ -83,8 +83,8 @@ inline std::vector<ComparedModel> compared_models(const std::vector<const Record
                                                   const decant::MissingEffect& result) {
   std::vector<ComparedModel> models{{"the model as it is"}};
   std::vector<decant::RefinedEffect> added = result.found;
-  if (added.empty() && !result.refined.empty()) {
-    added.push_back(result.refined.front());
+  if (added.empty() && result.nearest() != nullptr) {
+    added.push_back(*result.nearest());
   }
   if (!added.empty()) {
     ComparedModel& with = models.emplace_back();

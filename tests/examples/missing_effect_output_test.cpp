@@ -81,6 +81,28 @@ TEST_CASE("missing effect output: a jet's place and speed are told, and what was
   CHECK(example::missing_effect_json(effects, {}, {0, 0, -9.81})["surroundings"] == nlohmann::json::array());
 }
 
+TEST_CASE("missing effect output: of what explains too little that is the nearest which explains most") {
+  const std::vector<Effect> effects = drag_holes_table();
+  MissingEffect result = leak_found();
+  result.verdict = Verdict::Unexplained;
+  result.found.clear();
+  RefinedEffect drag;
+  drag.strength = Eigen::VectorXd::Constant(1, 2);
+  drag.deviation = Eigen::VectorXd::Constant(1, 0.1);
+  drag.probability = 0.9;
+  drag.distance = 18;
+  drag.share = 0.1;
+  result.refined.front().probability = 0.1;
+  result.refined.front().distance = 14;
+  result.refined.front().share = 0.33;
+  result.refined.insert(result.refined.begin(), drag);
+  CHECK_THAT(example::missing_effect_sentence(effects, result),
+             decant_test::contains("nearest is leak, where recordings begin to disagree 25 ml/s at 0.32 m/s, which "
+                                   "explains 33 %"));
+  CHECK(example::missing_effect_json(effects, result, {0, 0, -9.81})["nearest"] == "leak");
+  CHECK(example::missing_effect_json(effects, leak_found(), {0, 0, -9.81})["nearest"].is_null());
+}
+
 TEST_CASE("missing effect output: what references taught is told, or that there are none") {
   MissingEffect result;
   CHECK_THAT(example::references_sentence(0, result), decant_test::contains("There are no references"));

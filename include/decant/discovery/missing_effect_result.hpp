@@ -3,6 +3,7 @@
 
 /// What the workflow that finds what a model lacks comes to.
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -111,6 +112,13 @@ struct MissingEffect {
   std::size_t lessons = 0;    ///< references of other interactions whose ReferenceLesson was taken off, where none look
                               ///< alike
   std::size_t runs = 0;       ///< of models
+
+  /// What explains most of those that were refined, whatever it takes for it; nothing if none was.
+  const RefinedEffect* nearest() const noexcept {
+    const auto least = std::min_element(refined.begin(), refined.end(),
+                                        [](const auto& a, const auto& b) { return a.distance < b.distance; });
+    return least == refined.end() ? nullptr : &*least;
+  }
 
   /// The mended model is one that runs with these.
   std::vector<AppliedEffect> mended() const {
