@@ -109,7 +109,7 @@ TEST_CASE("effect point: strengths, places and times of several effects are one 
   CHECK(point.step(9) == Approx(0.08));
 
   // places as a whole
-  CHECK(point.with_place(1, {0.12, 0.21, 0.9}).value().segment(2, 3) == numbers({0.12, 0.21, 0.34}));
+  CHECK(point.with_place(1, {0.12, 0.21, 0.9}).value().segment(2, 3).isApprox(numbers({0.12, 0.21, 0.34})));
   CHECK_THROWS_WITH(point.with_place(0, {0, 0, 0}), decant_test::contains("place"));
 
   // steps of places and times are halved, and what is held is not tried any more; strengths keep theirs
