@@ -312,6 +312,15 @@ TEST_CASE("missing effect: what may be around is taken to be there where what is
   CHECK(model.effects()[past_it.found.front().effect].name == "tap");
   CHECK(past_it.surroundings.empty());
   CHECK(found({0.5}).surroundings.empty());
+  // a jet that falls back onto it says so itself: with it nothing is missing
+  const WithShelf upward(1.5, usual);
+  Jet on_it;
+  on_it.shelf = 0.1;
+  const MissingEffect met =
+      MissingEffectSearch<WithShelf>({{"a", &upward, film_of(on_it, 33, 1.5)}}, {}, run_jobs_on(executor)).find();
+  REQUIRE(met.surroundings.size() == 1);
+  CHECK(met.verdict == Verdict::Nothing);
+  CHECK(met.learn.before < met.judgement.chance.largest_distance);
 }
 
 TEST_CASE(

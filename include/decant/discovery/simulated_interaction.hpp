@@ -235,7 +235,7 @@ class SimulatedInteraction {
     if (on_wall_[effect]) {
       const auto nearest = nearest_of_wall(*of_body_[effect], camera.camera, own.inverse() * world_from_camera,
                                            own.rotation.conjugate() * up, seen);
-      return nearest ? std::optional(on_wall_[effect](settled({}, 1), *nearest)) : std::nullopt;
+      return nearest ? std::optional(placed(effect, *nearest)) : std::nullopt;
     }
     const Vector3<double> begin = world_from_camera * camera.camera.unproject(seen.pixel, 0);
     const Vector3<double> along = world_from_camera * camera.camera.unproject(seen.pixel, 1) - begin;

@@ -39,8 +39,8 @@ namespace decant::inline DECANT_TARGET {
 ///
 /// The slip falls as exp(-rate t) over a sub-step, as a whole: nothing overshoots. It is the slip before the sub-step,
 /// in which pressure has balanced weight: still water at an upright wall is not held up. What else accelerates liquid
-/// along the wall in a sub-step comes on top of the slip that is left. With a rate of zero it costs nothing and changes
-/// no bit.
+/// along the wall in a sub-step comes on top of the slip that is left. With a rate of zero, and no body that is
+/// rougher, it costs nothing and changes no bit.
 template <class ScalarType>
 struct WallFriction {
   using Scalar = ScalarType;
